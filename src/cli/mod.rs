@@ -1,0 +1,86 @@
+//! The command line: one file a verb.
+
+pub mod check;
+pub mod compact;
+pub mod compare;
+pub mod exec;
+pub mod export;
+pub mod import;
+pub mod inspect;
+pub mod path;
+pub mod plan;
+pub mod query;
+pub mod report;
+pub mod run;
+pub mod scene;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Visibility culling, measured: every speed stands beside its error.
+#[derive(Parser)]
+#[command(name = "cullmark", version, about, max_term_width = 100)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub verb: Verb,
+}
+
+#[derive(Subcommand)]
+pub enum Verb {
+    /// Expand a manifest, run its matrix, store the results and write the report
+    Run(run::Args),
+    /// Check a manifest: every mistake with line, column and a suggestion
+    Check(check::Args),
+    /// Show the matrix of a manifest without running it
+    Plan(plan::Args),
+    /// Write the report of a stored study
+    Report(report::Args),
+    /// Print results as a table, JSON or CSV, filtered
+    Query(query::Args),
+    /// Set two studies or versions side by side
+    Compare(compare::Args),
+    /// One frame of one method: counters, errors, image, submitted ids
+    Inspect(inspect::Args),
+    /// Scenes: info, generate, convert
+    #[command(subcommand)]
+    Scene(scene::Verb),
+    /// Camera paths: generate
+    #[command(subcommand)]
+    Path(path::Verb),
+    /// Write a study with all its results into one file
+    Export(export::Args),
+    /// Read an exported study into a database
+    Import(import::Args),
+    /// Shrink a database
+    Compact(compact::Args),
+    /// Run one trial from a specification on standard input (used by workers)
+    #[command(hide = true)]
+    Exec(exec::Args),
+}
+
+/// Exit code 0: all well; 1: ran, but something failed or is wrong; 2: bad input.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.verb {
+        Verb::Run(a) => run::run(a),
+        Verb::Check(a) => check::run(a),
+        Verb::Plan(a) => plan::run(a),
+        Verb::Report(a) => report::run(a),
+        Verb::Query(a) => query::run(a),
+        Verb::Compare(a) => compare::run(a),
+        Verb::Inspect(a) => inspect::run(a),
+        Verb::Scene(v) => scene::run(v),
+        Verb::Path(v) => path::run(v),
+        Verb::Export(a) => export::run(a),
+        Verb::Import(a) => import::run(a),
+        Verb::Compact(a) => compact::run(a),
+        Verb::Exec(a) => exec::run(a),
+    };
+    match result {
+        Ok(code) => code,
+        Err(e) => {
+            eprintln!("error: {e:#}");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! Culling: a [`Test`] judges blocks of 8 siblings, a [`Walk`] owns order and
+//! temporal state. The manifest composes them; neither knows any structure.
+
+pub mod depth_first;
+pub mod flat;
+pub mod frustum;
+pub mod normal_mask;
+pub mod octant_mask;
+
+use crate::error::Result;
+use crate::hierarchy::Hierarchy;
+use crate::math::View;
+use crate::registry::{Entry, Spec, find};
+use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
+
+/// What a method promises of its submitted set S against the visible set V*.
+/// The order is from the strongest promise to the weakest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Class {
+    /// S = V*.
+    Exact,
+    /// S contains V*, in object space.
+    Conservative,
+    /// Nothing that the same samples see is lost.
+    SampleConservative,
+    /// May lose members of V*.
+    Aggressive,
+    /// May lose and may add.
+    Approximate,
+}
+
+/// Which invisible triangles a test is entitled to remove; the oracle judges
+/// against exactly these sets.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Removes {
+    pub outside_frustum: bool,
+    pub back_facing: bool,
+    pub occluded: bool,
+}
+
+impl Removes {
+    pub fn union(self, o: Removes) -> Removes {
+        Removes {
+            outside_frustum: self.outside_frustum || o.outside_frustum,
+            back_facing: self.back_facing || o.back_facing,
+            occluded: self.occluded || o.occluded,
+        }
+    }
+}
+
+/// Judgement of one block. A lane that is not outside goes on with its `carry`:
+/// the work that is left for the lane's children, meaningful to the test alone
+/// except that 0 means "wholly inside: nothing below can be outside".
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Verdict {
+    /// Bit per lane.
+    pub outside: u8,
+    pub carry: [u8; 8],
+}
+
+/// A culling test with the per-scene columns it owns.
+pub trait Test: Send {
+    fn class(&self) -> Class;
+    fn removes(&self) -> Removes;
+    /// Builds the per-node columns; returns their bytes. Timed as part of building.
+    fn prepare(&mut self, scene: &Scene, hierarchy: &Hierarchy) -> usize;
+    /// Once a frame, before any judgement.
+    fn begin(&mut self, view: &View, hierarchy: &Hierarchy);
+    /// Carry of the roots; not 0 unless this frame nothing can be culled.
+    fn initial_carry(&self) -> u8;
+    /// Judges the `live` lanes of `block`. `carry` is what the parent got
+    /// (never 0: the walk does not ask then).
+    fn judge(&mut self, hierarchy: &Hierarchy, block: u32, live: u8, carry: u8, tally: &mut Tally) -> Verdict;
+    /// Judges the root blocks one after another without a hierarchy below them:
+    /// ORs the outside lanes of block `b` into `outside[b]`. A test with a wide
+    /// kernel overrides it.
+    fn judge_flat(&mut self, hierarchy: &Hierarchy, outside: &mut [u8], tally: &mut Tally) {
+        let carry = self.initial_carry();
+        for (block, out) in outside.iter_mut().enumerate() {
+            let live = hierarchy.links[block].live & !*out;
+            if live != 0 {
+                *out |= self.judge(hierarchy, block as u32, live, carry, tally).outside & live;
+            }
+        }
+    }
+}
+
+/// Order of visit and temporal state.
+pub trait Walk: Send {
+    /// A reason why this walk cannot run on `hierarchy`, if it cannot.
+    fn refuses(&self, hierarchy: &Hierarchy) -> Option<String>;
+    /// Appends what to draw for this frame. `tests` have begun the frame.
+    fn run(
+        &mut self,
+        view: &View,
+        hierarchy: &Hierarchy,
+        tests: &mut [Box<dyn Test>],
+        out: &mut DrawList,
+        tally: &mut Tally,
+    );
+}
+
+/// What a frame submits: ranges of entry positions, merged when contiguous.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct DrawList {
+    pub ranges: Vec<(u32, u32)>,
+}
+
+impl DrawList {
+    pub fn clear(&mut self) {
+        self.ranges.clear();
+    }
+
+    #[inline]
+    pub fn push(&mut self, first: u32, end: u32) {
+        if first == end {
+            return;
+        }
+        match self.ranges.last_mut() {
+            Some(last) if last.1 == first => last.1 = end,
+            _ => self.ranges.push((first, end)),
+        }
+    }
+
+    /// Entries submitted, duplicates included.
+    pub fn entry_count(&self) -> u64 {
+        self.ranges.iter().map(|(a, b)| u64::from(b - a)).sum()
+    }
+
+    pub fn positions(&self) -> impl Iterator<Item = u32> + '_ {
+        self.ranges.iter().flat_map(|(a, b)| *a..*b)
+    }
+
+    /// Draw calls: one a material run of each range.
+    pub fn draw_calls(&self, hierarchy: &Hierarchy) -> u64 {
+        self.ranges.iter().map(|(a, b)| u64::from(hierarchy.material_runs(*a, *b))).sum()
+    }
+}
+
+/// Work of one frame. Bit-identical between repeats, threads and instruction sets.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tally {
+    /// Nodes judged (lanes that were asked about), each once a frame.
+    pub nodes_visited: u64,
+    /// Lanes handed to a test, summed over tests.
+    pub lane_tests: u64,
+    /// Planes compared with a box, a lane each.
+    pub plane_tests: u64,
+    /// Normal or octant masks compared.
+    pub mask_tests: u64,
+}
+
+impl Tally {
+    /// Name, unit and value of every counter: counters are data.
+    pub fn named(&self) -> [(&'static str, &'static str, u64); 4] {
+        [
+            ("nodes_visited", "nodes", self.nodes_visited),
+            ("lane_tests", "lanes", self.lane_tests),
+            ("plane_tests", "planes", self.plane_tests),
+            ("mask_tests", "masks", self.mask_tests),
+        ]
+    }
+}
+
+/// Sorted by name.
+pub static TESTS: &[Entry<dyn Test>] = &[frustum::ENTRY, normal_mask::ENTRY, octant_mask::ENTRY];
+
+/// Sorted by name.
+pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, flat::ENTRY];
+
+/// The tests that `specs` name, in order, with defaults filled in.
+pub fn make_tests(specs: &[Spec]) -> Result<(Vec<Box<dyn Test>>, Vec<Spec>)> {
+    let mut tests = Vec::new();
+    let mut resolved = Vec::new();
+    for spec in specs {
+        let (entry, spec) = find("culling test", TESTS, spec)?;
+        tests.push((entry.make)(&spec));
+        resolved.push(spec);
+    }
+    Ok((tests, resolved))
+}
+
+pub fn make_walk(spec: &Spec) -> Result<(Box<dyn Walk>, Spec)> {
+    let (entry, resolved) = find("walk", WALKS, spec)?;
+    Ok(((entry.make)(&resolved), resolved))
+}
+
+/// Class and entitlement of a sum of tests: the weakest class, the union of sets.
+pub fn promise(tests: &[Box<dyn Test>]) -> (Class, Removes) {
+    tests.iter().fold((Class::Conservative, Removes::default()), |(class, removes), t| {
+        (class.max(t.class()), removes.union(t.removes()))
+    })
+}

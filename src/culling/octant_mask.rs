@@ -1,0 +1,4 @@
+//! octant_mask
+use super::*;
+pub const ENTRY: Entry<dyn Test> =
+    Entry { name: "octant_mask", about: "", revision: 0, params: &[], make: |_| unimplemented!() };

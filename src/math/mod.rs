@@ -1,0 +1,9 @@
+//! Geometry shared by every other room: boxes, planes, cameras, exact predicates.
+
+pub mod aabb;
+pub mod camera;
+pub mod predicates;
+
+pub use aabb::{Aabb, Box32};
+pub use camera::{Camera, Plane, Pose, Projection, View};
+pub use glam::{DVec2, DVec3, Vec3};

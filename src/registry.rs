@@ -1,0 +1,322 @@
+//! One grammar and one kind of table for everything a manifest can name:
+//! `name[:key=value[,key=value]]`, parts joined with `+`.
+//!
+//! A registry entry declares its parameters as data, so that a typo, a wrong
+//! type or a value out of range is found at expansion, before anything runs,
+//! and so that a new structure or test needs no change of the manifest.
+
+use crate::error::{Error, Result, did_you_mean};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// One parameter value. Serialised untagged: `4`, `0.5`, `true`, `"aabb"`.
+#[derive(Debug, Clone, PartialEq, PartialOrd, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Value {
+    Bool(bool),
+    Int(i64),
+    Float(f64),
+    Text(String),
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Value::Bool(b) => write!(f, "{b}"),
+            Value::Int(i) => write!(f, "{i}"),
+            // `{:?}` keeps the ".0", so that text and back gives the same type.
+            Value::Float(x) => write!(f, "{x:?}"),
+            Value::Text(s) => write!(f, "{s}"),
+        }
+    }
+}
+
+impl Value {
+    /// The value of a bare word in the string grammar.
+    pub fn parse(word: &str) -> Value {
+        if let Ok(i) = word.parse::<i64>() {
+            Value::Int(i)
+        } else if let Ok(x) = word.parse::<f64>() {
+            Value::Float(x)
+        } else if let Ok(b) = word.parse::<bool>() {
+            Value::Bool(b)
+        } else {
+            Value::Text(word.to_string())
+        }
+    }
+}
+
+pub type Params = BTreeMap<String, Value>;
+
+/// A named part with parameters: `octree:depth=4`. After [`Spec::resolve`] every
+/// parameter of the entry is present, so equal specs mean equal work.
+#[derive(Debug, Clone, PartialEq, PartialOrd, Serialize, Deserialize)]
+pub struct Spec {
+    pub kind: String,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub params: Params,
+}
+
+impl Spec {
+    pub fn new(kind: &str) -> Spec {
+        Spec { kind: kind.to_string(), params: Params::new() }
+    }
+
+    pub fn with(mut self, key: &str, value: Value) -> Spec {
+        self.params.insert(key.to_string(), value);
+        self
+    }
+
+    /// Parses one part of the grammar (no `+`).
+    pub fn parse(text: &str) -> Result<Spec> {
+        let (kind, rest) = match text.split_once(':') {
+            Some((kind, rest)) => (kind.trim(), Some(rest)),
+            None => (text.trim(), None),
+        };
+        if kind.is_empty() {
+            return Err(Error::new(format!("`{text}` names nothing")).help("write name[:key=value[,key=value]]"));
+        }
+        let mut spec = Spec::new(kind);
+        for pair in rest.into_iter().flat_map(|r| r.split(',')) {
+            let Some((key, value)) = pair.split_once('=') else {
+                return Err(
+                    Error::new(format!("`{pair}` in `{text}` is not key=value")).help("write name:key=value,key=value")
+                );
+            };
+            let (key, value) = (key.trim(), value.trim());
+            if key.is_empty() || value.is_empty() {
+                return Err(Error::new(format!("`{pair}` in `{text}` lacks a key or a value"))
+                    .help("write name:key=value,key=value"));
+            }
+            if spec.params.insert(key.to_string(), Value::parse(value)).is_some() {
+                return Err(Error::new(format!("`{key}` is given twice in `{text}`")));
+            }
+        }
+        Ok(spec)
+    }
+
+    /// Checks against `entry`, fills in defaults, converts whole floats and ints.
+    pub fn resolve(&self, params: &'static [Param]) -> Result<Spec> {
+        let mut out = Spec::new(&self.kind);
+        for (key, value) in &self.params {
+            let Some(param) = params.iter().find(|p| p.name == key) else {
+                let names = params.iter().map(|p| p.name);
+                let mut e = Error::new(format!("`{}` has no parameter `{key}`", self.kind)).key(key);
+                e.help = Some(match did_you_mean(key, names.clone()) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None if params.is_empty() => "it takes no parameters".to_string(),
+                    None => format!("it has: {}", names.collect::<Vec<_>>().join(", ")),
+                });
+                return Err(e);
+            };
+            out.params.insert(key.clone(), param.check(value)?);
+        }
+        for param in params {
+            out.params.entry(param.name.to_string()).or_insert_with(|| param.default.value());
+        }
+        Ok(out)
+    }
+
+    /// # Panics
+    /// If the spec was not resolved: every `get_*` is for constructors in a registry.
+    pub fn int(&self, key: &str) -> i64 {
+        match self.params.get(key) {
+            Some(Value::Int(i)) => *i,
+            other => panic!("unresolved spec: {}.{key} is {other:?}", self.kind),
+        }
+    }
+
+    pub fn float(&self, key: &str) -> f64 {
+        match self.params.get(key) {
+            Some(Value::Float(x)) => *x,
+            other => panic!("unresolved spec: {}.{key} is {other:?}", self.kind),
+        }
+    }
+
+    pub fn bool(&self, key: &str) -> bool {
+        match self.params.get(key) {
+            Some(Value::Bool(b)) => *b,
+            other => panic!("unresolved spec: {}.{key} is {other:?}", self.kind),
+        }
+    }
+
+    pub fn text(&self, key: &str) -> &str {
+        match self.params.get(key) {
+            Some(Value::Text(s)) => s,
+            other => panic!("unresolved spec: {}.{key} is {other:?}", self.kind),
+        }
+    }
+
+    /// The spec without parameters that have their default: short labels for charts.
+    pub fn label(&self, params: &'static [Param]) -> String {
+        let mut short = Spec::new(&self.kind);
+        for (key, value) in &self.params {
+            let default = params.iter().find(|p| p.name == key).map(|p| p.default.value());
+            if default.as_ref() != Some(value) {
+                short.params.insert(key.clone(), value.clone());
+            }
+        }
+        short.to_string()
+    }
+}
+
+impl fmt::Display for Spec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.kind)?;
+        for (i, (key, value)) in self.params.iter().enumerate() {
+            write!(f, "{}{key}={value}", if i == 0 { ':' } else { ',' })?;
+        }
+        Ok(())
+    }
+}
+
+/// Splits `a:x=1+b` into its parts; `none` and the empty string are no parts.
+pub fn parse_sum(text: &str) -> Result<Vec<Spec>> {
+    if text.trim() == "none" {
+        return Ok(Vec::new());
+    }
+    // `+` also occurs in exponents (`1e+5`), where it follows an `e` after a digit.
+    let bytes = text.as_bytes();
+    let mut parts = Vec::new();
+    let mut start = 0;
+    for (i, b) in bytes.iter().enumerate() {
+        let exponent =
+            i >= 2 && matches!(bytes[i - 1], b'e' | b'E') && (bytes[i - 2].is_ascii_digit() || bytes[i - 2] == b'.');
+        if *b == b'+' && !exponent {
+            parts.push(Spec::parse(&text[start..i])?);
+            start = i + 1;
+        }
+    }
+    parts.push(Spec::parse(&text[start..])?);
+    Ok(parts)
+}
+
+/// Joins parts back; the inverse of [`parse_sum`].
+pub fn format_sum(parts: &[Spec]) -> String {
+    if parts.is_empty() {
+        return "none".to_string();
+    }
+    parts.iter().map(Spec::to_string).collect::<Vec<_>>().join("+")
+}
+
+/// A declared parameter.
+#[derive(Debug)]
+pub struct Param {
+    pub name: &'static str,
+    pub default: Default,
+    pub about: &'static str,
+}
+
+/// Type, default and allowed values in one.
+#[derive(Debug)]
+pub enum Default {
+    Int {
+        value: i64,
+        min: i64,
+        max: i64,
+    },
+    Float {
+        value: f64,
+        min: f64,
+        max: f64,
+    },
+    Bool(bool),
+    /// The first choice is the default.
+    Choice(&'static [&'static str]),
+}
+
+impl Default {
+    pub fn value(&self) -> Value {
+        match self {
+            Default::Int { value, .. } => Value::Int(*value),
+            Default::Float { value, .. } => Value::Float(*value),
+            Default::Bool(b) => Value::Bool(*b),
+            Default::Choice(c) => Value::Text(c[0].to_string()),
+        }
+    }
+}
+
+impl Param {
+    fn check(&self, value: &Value) -> Result<Value> {
+        let name = self.name;
+        let wrong = |want: String| Err(Error::new(format!("is {value}, but must be {want}")).key(name));
+        match (&self.default, value) {
+            (Default::Int { min, max, .. }, Value::Int(i)) if (min..=max).contains(&i) => Ok(value.clone()),
+            (Default::Int { min, max, .. }, _) => wrong(format!("a whole number from {min} to {max}")),
+            (Default::Float { min, max, .. }, Value::Float(x)) if (min..=max).contains(&x) => Ok(value.clone()),
+            (Default::Float { min, max, .. }, Value::Int(i)) if *min <= *i as f64 && *i as f64 <= *max => {
+                Ok(Value::Float(*i as f64))
+            }
+            (Default::Float { min, max, .. }, _) => wrong(format!("a number from {min} to {max}")),
+            (Default::Bool(_), Value::Bool(_)) => Ok(value.clone()),
+            (Default::Bool(_), _) => wrong("true or false".to_string()),
+            (Default::Choice(c), Value::Text(s)) if c.contains(&s.as_str()) => Ok(value.clone()),
+            (Default::Choice(c), _) => {
+                let list = c.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
+                let near = did_you_mean(&value.to_string(), c.iter().copied());
+                let mut e = Error::new(format!("is {value}, but must be one of {list}")).key(name);
+                e.help = near.map(|n| format!("did you mean \"{n}\"?"));
+                Err(e)
+            }
+        }
+    }
+}
+
+/// One line of a registry: name, parameters and constructor of a `T`.
+pub struct Entry<T: ?Sized> {
+    pub name: &'static str,
+    pub about: &'static str,
+    /// Raised when the submitted sets change; part of `answer_id`.
+    pub revision: u32,
+    pub params: &'static [Param],
+    /// Called with a resolved spec only.
+    pub make: fn(&Spec) -> Box<T>,
+}
+
+/// Finds and checks: unknown names come back with a suggestion.
+pub fn find<'a, T: ?Sized>(what: &str, entries: &'a [Entry<T>], spec: &Spec) -> Result<(&'a Entry<T>, Spec)> {
+    let Some(entry) = entries.iter().find(|e| e.name == spec.kind) else {
+        let names = entries.iter().map(|e| e.name);
+        let mut e = Error::new(format!("unknown {what} `{}`", spec.kind));
+        e.help = Some(match did_you_mean(&spec.kind, names.clone()) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("known: {}", names.collect::<Vec<_>>().join(", ")),
+        });
+        return Err(e);
+    };
+    let resolved = spec.resolve(entry.params)?;
+    Ok((entry, resolved))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    static PARAMS: &[Param] = &[
+        Param { name: "depth", default: Default::Int { value: 4, min: 0, max: 10 }, about: "" },
+        Param { name: "root", default: Default::Choice(&["aabb", "cube"]), about: "" },
+        Param { name: "weight", default: Default::Float { value: 8.0, min: 0.0, max: 1e3 }, about: "" },
+    ];
+
+    #[test]
+    fn the_grammar_reads_back_what_it_writes() {
+        for text in ["octree:depth=4,root=cube", "list", "frustum+normal_mask:cells=4", "none", "bsp:weight=1e+2"] {
+            let parts = parse_sum(text).unwrap();
+            assert_eq!(parse_sum(&format_sum(&parts)).unwrap(), parts, "{text}");
+        }
+    }
+
+    #[test]
+    fn resolving_fills_defaults_and_names_what_is_wrong() {
+        let s = Spec::parse("octree:depth=3,weight=2").unwrap().resolve(PARAMS).unwrap();
+        assert_eq!(s.to_string(), "octree:depth=3,root=aabb,weight=2.0");
+        assert_eq!(s.label(PARAMS), "octree:depth=3,weight=2.0");
+        let e = Spec::parse("octree:dept=3").unwrap().resolve(PARAMS).unwrap_err();
+        assert_eq!(e.help.as_deref(), Some("did you mean `depth`?"));
+        let e = Spec::parse("octree:depth=11").unwrap().resolve(PARAMS).unwrap_err();
+        assert!(e.to_string().contains("from 0 to 10"), "{e}");
+        let e = Spec::parse("octree:root=cub").unwrap().resolve(PARAMS).unwrap_err();
+        assert_eq!(e.help.as_deref(), Some("did you mean \"cube\"?"));
+    }
+}

@@ -1,0 +1,97 @@
+//! What the store gives back of a study, and what reports, queries and
+//! comparisons read. Plain data: no SQL, no charts.
+
+use crate::culling::Class;
+use crate::record::{Environment, FrameErrors, RunSpec};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct StudyResults {
+    pub name: String,
+    pub title: String,
+    pub manifest_toml: String,
+    pub created_utc: String,
+    /// In the order of the matrix.
+    pub runs: Vec<RunResult>,
+    pub excluded: Vec<Excluded>,
+    /// Environments seen, by machine class.
+    pub environments: BTreeMap<String, Environment>,
+    /// Frames a point when curves are consolidated.
+    pub consolidate_frames: u32,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Excluded {
+    pub cell: String,
+    pub why: String,
+    pub count: u64,
+}
+
+/// Missing, skipped, failed and invalid stay distinct in every table and chart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RunStatus {
+    /// Not started, or trials still missing.
+    Pending,
+    /// Right for its class, all trials accepted.
+    Done,
+    /// Crashed, timed out, ran out of memory, or counters differed.
+    Failed,
+    /// Ran, but wrong for its declared class: times withheld.
+    Wrong,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct RunResult {
+    pub measurement_id: String,
+    pub answer_id: String,
+    pub spec: RunSpec,
+    /// Short labels without default parameters.
+    pub structure: String,
+    pub culling: String,
+    pub walk: String,
+    pub status: RunStatus,
+    /// Why it failed or is wrong; or marks such as "noisy machine".
+    pub reason: Option<String>,
+    pub stop_reason: Option<String>,
+    pub class: Option<Class>,
+    pub machine_class: String,
+    /// Accepted trials, in order. Empty when times are withheld.
+    pub trials: Vec<TrialSummary>,
+    /// Median over trials, frame by frame; empty when withheld.
+    pub cull_ns: Vec<f64>,
+    /// Identical between trials.
+    pub triangles: Vec<f64>,
+    pub draw_calls: Vec<f64>,
+    pub nodes_visited: Vec<f64>,
+    /// Per-trial `cull_ns`, for bands and the bootstrap.
+    pub trial_cull_ns: Vec<Vec<f64>>,
+    /// Sums over the path and structure figures (`nodes`, `leaves`, `structure_bytes`, ...).
+    pub counters: BTreeMap<String, f64>,
+    pub errors: Vec<FrameErrors>,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct TrialSummary {
+    pub repeat: u32,
+    pub total_cull_ns: f64,
+    pub build_ns: f64,
+    pub prepare_ns: f64,
+    pub load_ns: f64,
+    pub peak_rss_bytes: f64,
+    /// Sentinel over the median sentinel of the study on this machine.
+    pub noise: f64,
+    pub noisy: bool,
+}
+
+impl RunResult {
+    pub fn scene(&self) -> &str {
+        &self.spec.scene.name
+    }
+
+    /// `octree:depth=4 x frustum+normal_mask`, the walk only when it matters.
+    pub fn label(&self) -> String {
+        format!("{} × {}", self.structure, self.culling)
+    }
+}

@@ -1,0 +1,28 @@
+//! Spatial structures: each file builds one into the common [`Hierarchy`].
+//! Adding one is its file and its line in [`ALL`].
+
+pub mod bsp;
+pub mod list;
+pub mod octree;
+
+use crate::error::Result;
+use crate::hierarchy::Hierarchy;
+use crate::registry::{Entry, Spec, find};
+use crate::scene::Scene;
+
+/// Parameters of a structure, ready to build it over any scene.
+pub trait Structure: Send + Sync {
+    /// # Errors
+    /// When the parameters do not suit the scene (a BSP that splits without end);
+    /// the message says which parameter to change.
+    fn build(&self, scene: &Scene) -> Result<Hierarchy>;
+}
+
+/// Sorted by name.
+pub static ALL: &[Entry<dyn Structure>] = &[bsp::ENTRY, list::ENTRY, octree::ENTRY];
+
+/// The structure that `spec` names, with the spec's defaults filled in.
+pub fn make(spec: &Spec) -> Result<(Box<dyn Structure>, Spec)> {
+    let (entry, resolved) = find("structure", ALL, spec)?;
+    Ok(((entry.make)(&resolved), resolved))
+}

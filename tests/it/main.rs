@@ -1,0 +1,15 @@
+//! All integration tests, one binary. Each file is one area; test names are sentences.
+
+mod common;
+
+mod culling;
+mod end_to_end;
+mod faults;
+mod generators;
+mod manifest;
+mod oracle;
+mod report;
+mod scenes;
+mod store;
+mod structures;
+mod tidy;
