@@ -48,15 +48,21 @@ impl Ray {
     /// Where the ray enters a box that it meets before `far`; the far side is moved
     /// out by a few roundings, so that no triangle in the box is missed (Ize 2013).
     fn enters(&self, b: &Aabb, far: f64) -> bool {
-        let inverse = 1.0 / self.direction;
-        let (s, t) = ((b.lo - self.from) * inverse, (b.hi - self.from) * inverse);
-        // Zero times infinity, on the wall of a slab, is NaN; f64's min and max pass it over.
         let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
         for axis in 0..3 {
-            enter = enter.max(s[axis].min(t[axis]));
-            leave = leave.min(s[axis].max(t[axis]));
+            let (from, d) = (self.from[axis], self.direction[axis]);
+            if d == 0.0 {
+                // Along the slab: in it, walls included, or never.
+                if from < b.lo[axis] || from > b.hi[axis] {
+                    return false;
+                }
+                continue;
+            }
+            let (s, t) = ((b.lo[axis] - from) / d, (b.hi[axis] - from) / d);
+            enter = enter.max(s.min(t));
+            leave = leave.min(s.max(t));
         }
-        enter <= leave * (1.0 + 8.0 * f64::EPSILON) && enter <= far
+        enter <= leave * (1.0 + 8.0 * f64::EPSILON) && enter <= far * (1.0 + 8.0 * f64::EPSILON)
     }
 }
 
@@ -298,7 +304,7 @@ mod tests {
         let mut dice = Dice(ChaCha8Rng::seed_from_u64(3));
         let mut rays: Vec<Ray> = Vec::new();
         for i in 0..300 {
-            let from = (DVec3::new(dice.unit() * 40.0, dice.unit(), dice.unit()) * 8.0).round() * 0.5 - 0.5;
+            let from = (DVec3::new(dice.unit() * 80.0, dice.unit(), dice.unit()) * 4.0).round() * 0.5 - 1.0;
             let axis = [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Z, DVec3::new(1.0, 0.0, 1.0), dice.direction()];
             rays.push(Ray { from, direction: axis[i % axis.len()] });
         }
