@@ -9,11 +9,11 @@ use crate::culling::{self, Class, DrawList, Removes, Tally, Test, Walk};
 use crate::error::{Error, Result};
 use crate::hierarchy::Hierarchy;
 use crate::machine;
-use crate::math::{Pose, View};
+use crate::math::{Camera, Pose, View};
 use crate::oracle;
-use crate::record::{Counter, FrameErrors, Judgement, RunSpec, Sentinel, Series, TrialRecord};
+use crate::record::{Accuracy, Counter, FrameErrors, Judgement, RunSpec, Sentinel, Series, TrialRecord};
 use crate::scene::{Scene, load, walkthrough};
-use crate::structure;
+use crate::structure::{self, Structure};
 use std::path::Path;
 use std::time::Instant;
 
@@ -61,19 +61,35 @@ impl Setup {
             return Err(Error::new(format!("path `{}` has no frames", spec.path.name)));
         }
         let (structure, _) = structure::make(&spec.structure)?;
+        let (tests, _) = culling::make_tests(&spec.culling)?;
+        let (walk, _) = culling::make_walk(&spec.walk)?;
+        let setup = Setup::from_parts(scene, poses, &spec.camera, structure.as_ref(), tests, walk)?;
+        Ok(Setup { load_ns, ..setup })
+    }
+
+    /// The same from parts of one's own: any structure, tests and walk.
+    ///
+    /// # Errors
+    /// When the structure does not suit the scene, or the walk the structure.
+    pub fn from_parts(
+        scene: Scene,
+        poses: Vec<Pose>,
+        camera: &Camera,
+        structure: &dyn Structure,
+        mut tests: Vec<Box<dyn Test>>,
+        walk: Box<dyn Walk>,
+    ) -> Result<Setup> {
         let start = Instant::now();
         let hierarchy = structure.build(&scene)?;
         let build_ns = elapsed_ns(start);
-        let (mut tests, _) = culling::make_tests(&spec.culling)?;
         let start = Instant::now();
         let test_bytes = tests.iter_mut().map(|t| t.prepare(&scene, &hierarchy) as u64).sum();
         let prepare_ns = elapsed_ns(start);
-        let (walk, _) = culling::make_walk(&spec.walk)?;
         if let Some(why) = walk.refuses(&hierarchy) {
-            return Err(Error::new(format!("walk `{}` cannot run over `{}`: {why}", spec.walk, spec.structure)));
+            return Err(Error::new(format!("the walk cannot run over this structure: {why}")));
         }
         let (class, removes) = culling::promise(&tests);
-        let views = poses.iter().map(|p| View::new(&spec.camera, p)).collect();
+        let views = poses.iter().map(|p| View::new(camera, p)).collect();
         Ok(Setup {
             scene,
             poses,
@@ -83,7 +99,7 @@ impl Setup {
             walk,
             class,
             removes,
-            load_ns,
+            load_ns: 0,
             build_ns,
             prepare_ns,
             test_bytes,
@@ -139,6 +155,28 @@ impl Setup {
                 }
             })
             .collect()
+    }
+
+    /// The frames that `accuracy` asks to judge, with their poses.
+    pub fn judged_poses(&self, accuracy: &Accuracy) -> Vec<(u32, Pose)> {
+        let judged = oracle::judged_frames(self.views.len() as u32, accuracy);
+        judged.iter().map(|f| (*f, self.poses[*f as usize])).collect()
+    }
+
+    /// Compares the submitted sets with the truth at the frames that it holds.
+    pub fn judge(&mut self, truth: &oracle::Truth) -> Judgement {
+        let mut frames: Vec<FrameErrors> = Vec::new();
+        let removes = self.removes;
+        let work = self.count_pass(|setup, frame, list| {
+            if let Some(t) = truth.frames.iter().find(|t| t.frame as usize == frame) {
+                let submitted = submitted(&setup.scene, &setup.hierarchy, list);
+                let mut errors = oracle::judge_frame(&setup.scene, &setup.views[frame], t, &submitted, removes);
+                errors.submitted_entries = list.entry_count();
+                frames.push(errors);
+            }
+        });
+        let wrong = oracle::verdict(self.class, &frames);
+        Judgement { class: self.class, removes, wrong, frames, frames_hash: self.frames_hash(&work) }
     }
 
     fn frames_hash(&self, work: &[FrameWork]) -> String {
@@ -262,21 +300,9 @@ pub fn judge(spec: &RunSpec, cache: &Path) -> Result<Judgement> {
         }
     }
     let mut setup = Setup::new(spec, cache)?;
-    let judged = oracle::judged_frames(setup.views.len() as u32, &spec.accuracy);
-    let poses: Vec<(u32, Pose)> = judged.iter().map(|f| (*f, setup.poses[*f as usize])).collect();
+    let poses = setup.judged_poses(&spec.accuracy);
     let truth = oracle::truth_cached(&setup.scene, &spec.camera, &poses, &spec.accuracy, cache, &spec.truth_id())?;
-    let mut frames: Vec<FrameErrors> = Vec::new();
-    let removes = setup.removes;
-    let work = setup.count_pass(|setup, frame, list| {
-        if let Some(t) = truth.frames.iter().find(|t| t.frame as usize == frame) {
-            let submitted = submitted(&setup.scene, &setup.hierarchy, list);
-            let mut errors = oracle::judge_frame(&setup.scene, &setup.views[frame], t, &submitted, removes);
-            errors.submitted_entries = list.entry_count();
-            frames.push(errors);
-        }
-    });
-    let wrong = oracle::verdict(setup.class, &frames);
-    Ok(Judgement { class: setup.class, removes, wrong, frames, frames_hash: setup.frames_hash(&work) })
+    Ok(setup.judge(&truth))
 }
 
 /// The submitted set in the oracle's terms, which know no hierarchy.
