@@ -96,7 +96,8 @@ pub(super) fn bottom_up(hierarchy: &Hierarchy, mut visit: impl FnMut(usize, usiz
     let mut at = 0;
     while at < order.len() {
         let links = &hierarchy.links[order[at] as usize];
-        order.extend((0..LANES).filter(|l| links.live >> l & 1 == 1 && links.child[*l] != NONE).map(|l| links.child[l]));
+        order
+            .extend((0..LANES).filter(|l| links.live >> l & 1 == 1 && links.child[*l] != NONE).map(|l| links.child[l]));
         at += 1;
     }
     for block in order.into_iter().rev() {

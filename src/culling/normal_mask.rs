@@ -145,8 +145,7 @@ impl Test for NormalMask {
 
     fn prepare(&mut self, scene: &Scene, hierarchy: &Hierarchy) -> usize {
         let words = self.cells.words();
-        let cell: Vec<u16> =
-            (0..scene.len() as u32).map(|t| self.cells.of_triangle(scene, t) as u16).collect();
+        let cell: Vec<u16> = (0..scene.len() as u32).map(|t| self.cells.of_triangle(scene, t) as u16).collect();
         self.masks = vec![[0; LANES]; hierarchy.links.len() * words];
         let masks = &mut self.masks;
         super::descent::bottom_up(hierarchy, |block, lane| {
