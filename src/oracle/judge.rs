@@ -26,7 +26,7 @@ pub struct Submitted {
 
 impl Submitted {
     /// Nothing, of a scene of `len` triangles.
-    pub fn nothing(len: usize) -> Submitted {
+    pub fn none(len: usize) -> Submitted {
         Submitted { triangles: BitSet::new(len), lost_pieces: Vec::new() }
     }
 }

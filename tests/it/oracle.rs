@@ -399,7 +399,7 @@ fn of_two_equal_surfaces_either_may_be_drawn_but_not_neither() {
     let view = View::new(&camera, &ahead());
     let truth = truth_of(&scene, &camera, ahead(), &accuracy(64, 36, 1));
     let judge = |ids: &[u32]| {
-        let mut submitted = Submitted::nothing(scene.len());
+        let mut submitted = Submitted::none(scene.len());
         ids.iter().for_each(|t| submitted.triangles.insert(*t));
         judge_frame(&scene, &view, &truth, &submitted, HIDDEN)
     };
