@@ -66,6 +66,9 @@ pub trait Test: Send {
     fn removes(&self) -> Removes;
     /// Builds the per-node columns; returns their bytes. Timed as part of building.
     fn prepare(&mut self, scene: &Scene, hierarchy: &Hierarchy) -> usize;
+    /// Forgets what was learnt in earlier frames, so that every pass over a path
+    /// does the same work.
+    fn reset(&mut self) {}
     /// Once a frame, before any judgement.
     fn begin(&mut self, view: &View, hierarchy: &Hierarchy);
     /// Carry of the roots; not 0 unless this frame nothing can be culled.
@@ -91,6 +94,8 @@ pub trait Test: Send {
 pub trait Walk: Send {
     /// A reason why this walk cannot run on `hierarchy`, if it cannot.
     fn refuses(&self, hierarchy: &Hierarchy) -> Option<String>;
+    /// Forgets earlier frames, as [`Test::reset`].
+    fn reset(&mut self) {}
     /// Appends what to draw for this frame. `tests` have begun the frame.
     fn run(
         &mut self,
