@@ -28,7 +28,7 @@ pub fn encode(values: &[f64]) -> Vec<u8> {
     if let Some(whole) = whole {
         // Counts drift from frame to frame, times do not: the shorter one is kept.
         let plain = pack(Kind::U32, values.len(), &shuffle(whole.iter().map(|v| v.to_le_bytes())));
-        let delta = pack(Kind::U32Delta, values.len(), &shuffle(deltas(&whole).map(u32::to_le_bytes)));
+        let delta = pack(Kind::U32Delta, values.len(), &shuffle(deltas(&whole).into_iter().map(u32::to_le_bytes)));
         return if delta.len() < plain.len() { delta } else { plain };
     }
     if values.iter().all(|v| f64::from(*v as f32).to_bits() == v.to_bits()) {
@@ -70,12 +70,10 @@ fn whole(v: f64) -> Option<u32> {
 }
 
 /// Zigzag: small differences of either sign become small numbers.
-fn deltas(values: &[u32]) -> impl Iterator<Item = u32> {
+fn deltas(values: &[u32]) -> Vec<u32> {
     let before = std::iter::once(0).chain(values.iter().copied());
-    values.iter().zip(before).map(|(v, p)| {
-        let d = v.wrapping_sub(p) as i32;
-        ((d << 1) ^ (d >> 31)) as u32
-    })
+    let zigzag = |d: i32| ((d << 1) ^ (d >> 31)) as u32;
+    values.iter().zip(before).map(|(v, p)| zigzag(v.wrapping_sub(p) as i32)).collect()
 }
 
 /// All first bytes, then all second bytes, and so on.
@@ -137,7 +135,8 @@ mod tests {
 
     #[test]
     fn a_smooth_count_shrinks_a_lot_and_damage_is_noticed() {
-        let values: Vec<f64> = (0..2000).map(|i| 50_000.0 + (f64::from(i) * 0.01).sin().mul_add(9e3, 0.0).round()).collect();
+        let values: Vec<f64> =
+            (0..2000).map(|i| 50_000.0 + (f64::from(i) * 0.01).sin().mul_add(9e3, 0.0).round()).collect();
         let blob = encode(&values);
         assert!(blob.len() * 5 < values.len() * 8, "{} bytes", blob.len());
         assert_eq!(decode(&blob).unwrap(), values);

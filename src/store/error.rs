@@ -72,9 +72,7 @@ pub fn explain_migration(path: &Path, e: &MigrateError) -> Error {
         MigrateError::Dirty(v) => Error::new(format!("step {v} of the database's schema was interrupted"))
             .in_file(path)
             .help("restore the file from a copy, or choose another with --db"),
-        MigrateError::Execute(e) | MigrateError::ExecuteMigration(e, _) => {
-            explain(path, "preparing the database", e)
-        }
+        MigrateError::Execute(e) | MigrateError::ExecuteMigration(e, _) => explain(path, "preparing the database", e),
         other => Error::new(format!("preparing the database: {other}")).in_file(path),
     }
 }

@@ -21,9 +21,7 @@ pub mod settle;
 pub mod submit;
 
 use crate::error::{Error, Result};
-use sqlx::sqlite::{
-    SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
-};
+use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -60,8 +58,7 @@ impl Store {
     pub async fn open(path: &Path) -> Result<Store> {
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder).map_err(|e| {
-                Error::io(folder, "the folder of the database cannot be made", &e)
-                    .help("choose another file with --db")
+                Error::io(folder, "the folder of the database cannot be made", &e).help("choose another file with --db")
             })?;
         }
         Store::connect(path, true).await
@@ -73,9 +70,9 @@ impl Store {
     /// As [`Store::open`], and when there is no such file.
     pub async fn open_existing(path: &Path) -> Result<Store> {
         if !path.is_file() {
-            return Err(Error::new("there is no such database").in_file(path).help(
-                "run a study first (`cullmark run experiments/quick.toml`), or name another file with --db",
-            ));
+            return Err(Error::new("there is no such database")
+                .in_file(path)
+                .help("run a study first (`cullmark run experiments/quick.toml`), or name another file with --db"));
         }
         Store::connect(path, false).await
     }
@@ -144,11 +141,10 @@ impl Store {
     /// A process that is creating the file right now has made the table of
     /// migrations but not yet left its mark.
     async fn is_half_made(&self) -> Result<bool> {
-        let ours: i64 =
-            sqlx::query_scalar("SELECT count(*) FROM sqlite_master WHERE name = '_sqlx_migrations'")
-                .fetch_one(&self.writer)
-                .await
-                .map_err(|e| self.explain("opening it", &e))?;
+        let ours: i64 = sqlx::query_scalar("SELECT count(*) FROM sqlite_master WHERE name = '_sqlx_migrations'")
+            .fetch_one(&self.writer)
+            .await
+            .map_err(|e| self.explain("opening it", &e))?;
         Ok(ours > 0)
     }
 

@@ -243,8 +243,13 @@ impl Store {
                 .await
                 .map_err(explain)?;
         let last = name != "crashed" || crashes + 1 >= CRASH_LIMIT;
-        let reason = if name == "crashed" && last { format!("{reason} (attempt {} of it)", crashes + 1) } else { reason.clone() };
-        let held = fence(&mut tx, lease, if last { "failed" } else { "queued" }, Some(&reason)).await.map_err(explain)?;
+        let reason = if name == "crashed" && last {
+            format!("{reason} (attempt {} of it)", crashes + 1)
+        } else {
+            reason.clone()
+        };
+        let held =
+            fence(&mut tx, lease, if last { "failed" } else { "queued" }, Some(&reason)).await.map_err(explain)?;
         end_attempt(&mut tx, lease, if held { name } else { "fenced" }, Some(&reason)).await.map_err(explain)?;
         tx.commit().await.map_err(explain)?;
         Ok(held && last)
@@ -266,7 +271,8 @@ impl Store {
             insert_trial(&mut tx, lease, record, wall_ns).await.map_err(explain)?;
             insert_series(&mut tx, &lease.job.target, &rows).await.map_err(explain)?;
             insert_counters(&mut tx, &lease.job.target, record).await.map_err(explain)?;
-            claim_frames_hash(&mut tx, &lease.spec.answer_id(), &record.frames_hash).await.map_err(explain)?;
+            let answer_id = answer_of(&mut tx, &lease.job).await.map_err(explain)?;
+            claim_frames_hash(&mut tx, &answer_id, &record.frames_hash).await.map_err(explain)?;
         }
         tx.commit().await.map_err(explain)?;
         self.durable(false).await?;
@@ -284,7 +290,7 @@ impl Store {
         let held = fence(&mut tx, lease, "done", None).await.map_err(explain)?;
         end_attempt(&mut tx, lease, if held { "accepted" } else { "fenced" }, None).await.map_err(explain)?;
         if held {
-            let answer_id = lease.spec.answer_id();
+            let answer_id = answer_of(&mut tx, &lease.job).await.map_err(explain)?;
             let class = serde_json::to_value(judgement.class).ok().and_then(|v| v.as_str().map(str::to_string));
             sqlx::query(
                 "INSERT INTO judgements (judgement_id, answer_id, class, wrong, frames_hash, record_json, accepted_ms, \
@@ -406,7 +412,8 @@ async fn fence(
 ) -> sqlx::Result<bool> {
     let sql = "UPDATE jobs SET state = $3, reason = $4, owner = NULL, lease_until_ms = 0 \
                WHERE id = $1 AND epoch = $2 AND state = 'leased'";
-    let done = sqlx::query(sql).bind(lease.job.id).bind(lease.epoch).bind(state).bind(reason).execute(&mut **tx).await?;
+    let done =
+        sqlx::query(sql).bind(lease.job.id).bind(lease.epoch).bind(state).bind(reason).execute(&mut **tx).await?;
     Ok(done.rows_affected() == 1)
 }
 
@@ -425,6 +432,17 @@ async fn end_attempt(
         .execute(&mut **tx)
         .await?;
     Ok(())
+}
+
+/// Read, not hashed again: the spec's text may be older than this program.
+async fn answer_of(tx: &mut Transaction<'_, Sqlite>, job: &Job) -> sqlx::Result<String> {
+    sqlx::query_scalar(match job.kind {
+        Kind::Trial => "SELECT answer_id FROM measurements WHERE measurement_id = $1",
+        Kind::Judge => "SELECT answer_id FROM measurements WHERE judgement_id = $1 LIMIT 1",
+    })
+    .bind(&job.target)
+    .fetch_one(&mut **tx)
+    .await
 }
 
 /// The first to answer fixes the hash of all frames; `settle` compares the others with it.

@@ -198,12 +198,7 @@ pub(super) fn trial_order(block: i64, repeat: u32, seed: u64, measurement_id: &s
     (block.min(0x3fff) << 48) | (i64::from(repeat.min(0xffff)) << 32) | i64::from(draw)
 }
 
-async fn put_study(
-    tx: &mut Transaction<'_, Sqlite>,
-    s: &Submission,
-    ids: &[Ids],
-    blocks: &[i64],
-) -> sqlx::Result<i64> {
+async fn put_study(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids], blocks: &[i64]) -> sqlx::Result<i64> {
     let mut hash = blake3::Hasher::new();
     for (id, c) in ids.iter().zip(&s.cells) {
         for text in [&id.measurement, &id.judgement, &id.spec_json, &c.structure, &c.culling, &c.walk] {
@@ -286,15 +281,31 @@ async fn retry_failed(tx: &mut Transaction<'_, Sqlite>, study_id: i64) -> sqlx::
         format!("DELETE FROM series WHERE measurement_id IN ({disagreed})"),
         format!("DELETE FROM counters WHERE measurement_id IN ({disagreed})"),
         format!("DELETE FROM trials WHERE measurement_id IN ({disagreed})"),
-        format!("DELETE FROM judgements WHERE judgement_id IN ({})", disagreed.replace("m.measurement_id FROM", "m.judgement_id FROM")),
-        format!("UPDATE answers SET frames_hash = NULL WHERE answer_id IN ({})", disagreed.replace("m.measurement_id FROM", "m.answer_id FROM")),
-        format!("UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'trial' AND target IN ({disagreed})"),
-        format!("UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'judge' AND state = 'done' AND target IN ({judged}) \
-                 AND NOT EXISTS (SELECT 1 FROM judgements j WHERE j.judgement_id = jobs.target)"),
-        format!("UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'trial' AND state IN ('failed', 'cancelled') AND target IN ({failed})"),
-        format!("UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'judge' AND state IN ('failed', 'cancelled') AND target IN ({judged})"),
-        format!("UPDATE measurements SET status = 'pending', reason = NULL, stop_reason = NULL, finished_ms = NULL \
-                 WHERE measurement_id IN ({failed})"),
+        format!(
+            "DELETE FROM judgements WHERE judgement_id IN ({})",
+            disagreed.replace("m.measurement_id FROM", "m.judgement_id FROM")
+        ),
+        format!(
+            "UPDATE answers SET frames_hash = NULL WHERE answer_id IN ({})",
+            disagreed.replace("m.measurement_id FROM", "m.answer_id FROM")
+        ),
+        format!(
+            "UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'trial' AND target IN ({disagreed})"
+        ),
+        format!(
+            "UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'judge' AND state = 'done' AND target IN ({judged}) \
+                 AND NOT EXISTS (SELECT 1 FROM judgements j WHERE j.judgement_id = jobs.target)"
+        ),
+        format!(
+            "UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'trial' AND state IN ('failed', 'cancelled') AND target IN ({failed})"
+        ),
+        format!(
+            "UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'judge' AND state IN ('failed', 'cancelled') AND target IN ({judged})"
+        ),
+        format!(
+            "UPDATE measurements SET status = 'pending', reason = NULL, stop_reason = NULL, finished_ms = NULL \
+                 WHERE measurement_id IN ({failed})"
+        ),
     ] {
         sqlx::query(sqlx::AssertSqlSafe(sql)).bind(study_id).execute(&mut **tx).await?;
     }
