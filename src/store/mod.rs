@@ -10,6 +10,7 @@
 //! - `read`: results for reports, queries and comparisons;
 //! - `archive`, `compact`: one-file exchange, and size.
 
+mod accept;
 pub mod archive;
 mod blob;
 pub mod compact;
@@ -197,6 +198,11 @@ pub fn read_results(db: &Path, study: &str, detail: Detail) -> Result<crate::res
         store.close().await;
         results
     })
+}
+
+/// How progress and logs call a run: `scene: structure × culling`.
+pub fn label(spec: &crate::record::RunSpec) -> String {
+    format!("{}: {} × {}", spec.scene.name, spec.structure, spec.culling_label())
 }
 
 /// Milliseconds since 1970, UTC.

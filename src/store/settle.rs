@@ -2,10 +2,10 @@
 //! it wrong, did it fail, or does it need another trial? Pure in what is stored,
 //! so that it can be asked again after any interruption.
 
-use super::queue::Work;
+use super::accept::Work;
 use super::{Store, now_ms, submit};
 use crate::error::Result;
-use crate::record::RepeatPolicy;
+use crate::record::{RepeatPolicy, RunSpec};
 use crate::results::RunStatus;
 use crate::stats;
 use sqlx::{Sqlite, Transaction};
@@ -33,6 +33,8 @@ pub struct Settled {
     pub repeats: u32,
     /// Trials queued because the interval is still wide or a repeat was disturbed.
     pub trials_added: u32,
+    /// Trials no longer needed because the run failed or is wrong.
+    pub trials_cancelled: u32,
 }
 
 struct Trial {
@@ -53,8 +55,8 @@ impl Store {
     pub async fn settle(&self, study_id: i64, measurement_id: &str, policy: &RepeatPolicy) -> Result<Settled> {
         let explain = |e: sqlx::Error| self.explain("a decision", &e);
         let mut tx = self.begin("a decision").await?;
-        let settled = self.decide(&mut tx, study_id, measurement_id, policy).await?;
-        write(&mut tx, measurement_id, &settled).await.map_err(explain)?;
+        let mut settled = self.decide(&mut tx, study_id, measurement_id, policy).await?;
+        settled.trials_cancelled = write(&mut tx, measurement_id, &settled).await.map_err(explain)?;
         tx.commit().await.map_err(explain)?;
         Ok(settled)
     }
@@ -74,6 +76,21 @@ impl Store {
         .fetch_all(&self.writer)
         .await
         .map_err(|e| self.explain("reading the study", &e))
+    }
+
+    /// How the run is called in progress and logs.
+    ///
+    /// # Errors
+    /// When the study has no such run or the database fails.
+    pub async fn label_of(&self, study_id: i64, measurement_id: &str) -> Result<String> {
+        let json: String =
+            sqlx::query_scalar("SELECT spec_json FROM study_runs WHERE study_id = $1 AND measurement_id = $2 LIMIT 1")
+                .bind(study_id)
+                .bind(measurement_id)
+                .fetch_one(&self.writer)
+                .await
+                .map_err(|e| self.explain("reading the study", &e))?;
+        Ok(super::label(&self.parse::<RunSpec>(&json, "a run")?))
     }
 
     async fn decide(
@@ -103,7 +120,14 @@ impl Store {
             trials.push(Trial { repeat, take, total_ns, work: self.parse(&work, "a trial")?, noisy: noisy != 0 });
         }
         let repeats = trials.iter().filter(|t| t.take == 0).count() as u32;
-        let pending = Settled { status: RunStatus::Pending, reason: None, stop_reason: None, repeats, trials_added: 0 };
+        let pending = Settled {
+            status: RunStatus::Pending,
+            reason: None,
+            stop_reason: None,
+            repeats,
+            trials_added: 0,
+            trials_cancelled: 0,
+        };
         let end = |status, reason: String| Settled { status, reason: Some(reason), ..pending.clone() };
 
         let judgement: Option<(Option<String>, String)> =
@@ -346,7 +370,7 @@ async fn failed_job(
     }))
 }
 
-async fn write(tx: &mut Transaction<'_, Sqlite>, measurement_id: &str, s: &Settled) -> sqlx::Result<()> {
+async fn write(tx: &mut Transaction<'_, Sqlite>, measurement_id: &str, s: &Settled) -> sqlx::Result<u32> {
     let status = match s.status {
         RunStatus::Pending => "pending",
         RunStatus::Done => "done",
@@ -368,10 +392,13 @@ async fn write(tx: &mut Transaction<'_, Sqlite>, measurement_id: &str, s: &Settl
     .await?;
     if matches!(s.status, RunStatus::Failed | RunStatus::Wrong) {
         // Times of a run that is not right would be withheld: do not measure them.
-        sqlx::query("UPDATE jobs SET state = 'cancelled' WHERE kind = 'trial' AND target = $1 AND state = 'queued'")
-            .bind(measurement_id)
-            .execute(&mut **tx)
-            .await?;
+        let cancelled = sqlx::query(
+            "UPDATE jobs SET state = 'cancelled' WHERE kind = 'trial' AND target = $1 AND state = 'queued'",
+        )
+        .bind(measurement_id)
+        .execute(&mut **tx)
+        .await?;
+        return Ok(cancelled.rows_affected() as u32);
     }
-    Ok(())
+    Ok(0)
 }
