@@ -137,7 +137,7 @@ fn files_that_are_not_scenes_are_refused_with_a_way_out() {
         1.0,
         false,
     );
-    assert!(e.unwrap_err().message.contains("unknown scene generator `aren`"));
+    assert!(e.unwrap_err().message.contains("unknown generator `aren`"));
 }
 
 #[test]
