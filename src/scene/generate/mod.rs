@@ -13,6 +13,7 @@ mod props;
 pub(in crate::scene) mod random;
 mod rooms;
 mod solids;
+mod terrain;
 
 use crate::error::{Error, Result};
 use crate::registry::{Entry, Spec, Value, find};

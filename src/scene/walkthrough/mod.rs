@@ -1,1 +1,3 @@
 //! Walkthroughs.
+
+pub mod generate;

@@ -1,0 +1,2 @@
+//! Gold Rush.
+pub(super) use super::nucleus::build;
