@@ -2,10 +2,16 @@
 //! Team Fortress 2 maps of Serpa & Rodrigues (2014). Names and triangle counts are
 //! theirs; layouts are our own, each with the character its name promises.
 
+mod coal_town;
 mod gold_rush;
+mod gorge;
 mod house;
 mod kit;
 mod nucleus;
+mod ravine;
+mod saw;
+mod viaduct;
+mod works;
 
 use super::budget::spend;
 use super::{Entry, Generator};
@@ -39,6 +45,11 @@ struct Map {
 /// In order of the published counts; `map` names them.
 static PRESETS: &[Preset] = &[
     Preset { name: "nucleus", triangles: 19_963, build: nucleus::build },
+    Preset { name: "coal_town", triangles: 25_894, build: coal_town::build },
+    Preset { name: "ravine", triangles: 33_422, build: ravine::build },
+    Preset { name: "viaduct", triangles: 56_600, build: viaduct::build },
+    Preset { name: "gorge", triangles: 55_514, build: gorge::build },
+    Preset { name: "saw", triangles: 60_532, build: saw::build },
     Preset { name: "gold_rush", triangles: 131_598, build: gold_rush::build },
 ];
 
