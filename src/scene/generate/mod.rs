@@ -34,7 +34,7 @@ pub static ALL: &[Entry<dyn Generator>] = &[arena::ENTRY, blocks::ENTRY, rooms::
 pub fn make(spec: &Spec) -> Result<(Box<dyn Generator>, Spec)> {
     let (entry, resolved) = find("generator", ALL, spec)?;
     let least = match entry.name {
-        "arena" => arena::TRIANGLES_MIN,
+        "arena" => arena::least(&resolved),
         "blocks" => blocks::TRIANGLES_MIN,
         _ => rooms::TRIANGLES_MIN,
     };

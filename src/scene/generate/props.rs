@@ -241,7 +241,7 @@ fn emit(b: &mut Builder, prop: Prop, s: f64, l: usize, rng: &mut Random) {
             b.lathe(&scaled, 6 + 2 * l, (1.0, 1.0));
         }
         Prop::Rock | Prop::SnowRock => {
-            b.paint(if prop == Prop::Rock { "rock_boulder" } else { "rock_snowy" });
+            b.paint(if prop == Prop::Rock { "rock_boulder" } else { "rock_frosted" });
             let r = v3(rng.range(0.8, 1.3), rng.range(0.6, 1.0), rng.range(0.5, 0.9)) * s;
             blob(b, v3(0.0, 0.0, r.z * 0.25), r, 5 + l, 3 + l / 2, 0.28, rng);
         }
@@ -249,7 +249,7 @@ fn emit(b: &mut Builder, prop: Prop, s: f64, l: usize, rng: &mut Random) {
             let h = s * rng.range(0.85, 1.15);
             b.paint("bark_pine");
             b.column(v3(0.0, 0.0, -0.2), 0.05 * h, 0.03 * h, 0.4 * h, 4 + l / 2);
-            b.paint(if prop == Prop::Pine { "pine_needles" } else { "pine_snowy" });
+            b.paint(if prop == Prop::Pine { "pine_needles" } else { "frosted_pine" });
             let tiers = (2 + l / 2).min(6);
             for t in 0..tiers {
                 let z = 0.18 + 0.62 * t as f64 / tiers as f64;

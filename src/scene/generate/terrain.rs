@@ -11,12 +11,14 @@ pub(super) struct Terrain {
     /// Cells a side, a power of two.
     cells: usize,
     heights: Vec<f64>,
+    /// Roads: lines and half widths. Their edges are kept in the triangulation.
+    roads: Vec<(Vec<DVec3>, f64)>,
 }
 
 impl Terrain {
     pub fn new(half: f64, cells: usize, height: impl Fn(f64, f64) -> f64) -> Terrain {
         assert!(cells.is_power_of_two());
-        let mut t = Terrain { half, cells, heights: vec![0.0; (cells + 1) * (cells + 1)] };
+        let mut t = Terrain { half, cells, heights: vec![0.0; (cells + 1) * (cells + 1)], roads: Vec::new() };
         t.shape(|x, y, _| height(x, y));
         t
     }
@@ -53,6 +55,18 @@ impl Terrain {
         });
     }
 
+    /// Makes a band along a polyline a road, for [`Terrain::on_road`].
+    pub fn pave(&mut self, line: &[DVec3], half_width: f64) {
+        self.roads.push((line.to_vec(), half_width));
+    }
+
+    pub fn on_road(&self, p: DVec3) -> bool {
+        self.roads.iter().any(|(line, half)| {
+            let (d, z) = nearest(line, p.x, p.y);
+            d < *half && (z - p.z).abs() < 1.5
+        })
+    }
+
     /// Height at a point, between the grid's points.
     pub fn height(&self, x: f64, y: f64) -> f64 {
         let scale = self.cells as f64 / (2.0 * self.half);
@@ -72,6 +86,16 @@ impl Terrain {
     fn errors(&self) -> Vec<f64> {
         let (n, size) = (self.cells, self.cells + 1);
         let mut errors = vec![0.0f64; size * size];
+        let step = 2.0 * self.half / n as f64;
+        for (line, half) in &self.roads {
+            for (i, e) in errors.iter_mut().enumerate() {
+                let p = self.place(i % size, i / size);
+                if (nearest(line, p.x, p.y).0 - half).abs() < step * 0.8 {
+                    // More than any tolerance.
+                    *e = 2.0;
+                }
+            }
+        }
         let triangles = 2 * n * n - 2;
         let parents = triangles - n * n;
         for i in (0..triangles).rev() {

@@ -86,7 +86,7 @@ pub static ALL: &[Entry<dyn Walker>] = &[
             FRAMES,
             Param {
                 name: "speed_m",
-                default: Default::Float { value: 0.2, min: 0.001, max: 100.0 },
+                default: Default::Float { value: 0.3, min: 0.001, max: 100.0 },
                 about: "metres a frame",
             },
             Param { name: "seed", default: Default::Int { value: 1, min: 0, max: i64::MAX }, about: "chooses the way" },

@@ -44,7 +44,7 @@ pub(super) fn build(seed: u64) -> Map {
         let (d, z) = super::super::terrain::nearest(&line, x, y);
         super::super::terrain::mix(h, z + 0.35 * hills(rough + 5, x / 12.0, y / 12.0), (wide(x, y) + 5.0 - d) / 5.0)
     });
-    k.lay(&way, 2.4, 2.5);
+    k.road(&way, 2.4, 2.5);
     k.track(&way.map(|p| p + v3(0.0, 0.0, 0.05)));
     for (x, y, z, a) in [(-60.0, -72.0, 0.27, 0.0), (-56.0, -72.0, 0.3, 0.0), (0.0, 0.68, 6.32, 3.12)] {
         k.wagon(v3(x, y, z), a, "gold_load");

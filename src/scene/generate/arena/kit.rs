@@ -49,6 +49,14 @@ impl Kit {
         self.ground.lay(&line, half_width, blend);
     }
 
+    /// Like [`Kit::lay`], and the ground looks trodden.
+    pub fn road(&mut self, line: &[DVec3], half_width: f64, blend: f64) {
+        self.lay(line, half_width, blend);
+        let f = self.b.frame();
+        let line: Vec<DVec3> = line.iter().map(|p| f.apply(*p)).collect();
+        self.ground.pave(&line, half_width);
+    }
+
     pub fn keep_out(&mut self, x0: f64, y0: f64, x1: f64, y1: f64) {
         let f = self.b.frame();
         let (a, b) = (f.apply(v3(x0, y0, 0.0)), f.apply(v3(x1, y1, 0.0)));
@@ -92,7 +100,8 @@ impl Kit {
                 .keep_out
                 .iter()
                 .any(|k| x > k[0] - margin && x < k[2] + margin && y > k[1] - margin && y < k[3] + margin);
-            if !blocked && accept(x, y, z, slope) {
+            // Things on a sheer face would stick out of it.
+            if !blocked && slope < 2.2 && accept(x, y, z, slope) {
                 let frame = Frame::turned(v3(x, y, z - 0.03), turn);
                 // Few sizes, so that equal props cost equally.
                 let seed = self.rng.bits();

@@ -20,14 +20,13 @@ use crate::registry::{Default, Param, Spec};
 use crate::scene::Scene;
 use kit::Kit;
 
-/// More than the walls of any preset.
-pub(super) const TRIANGLES_MIN: i64 = 16_000;
-
 /// What differs between the maps.
 struct Preset {
     name: &'static str,
     /// Triangles of the published map.
     triangles: usize,
+    /// More than walls and coarsest ground need, whatever the seed.
+    least: i64,
     build: fn(seed: u64) -> Map,
 }
 
@@ -44,13 +43,13 @@ struct Map {
 
 /// In order of the published counts; `map` names them.
 static PRESETS: &[Preset] = &[
-    Preset { name: "nucleus", triangles: 19_963, build: nucleus::build },
-    Preset { name: "coal_town", triangles: 25_894, build: coal_town::build },
-    Preset { name: "ravine", triangles: 33_422, build: ravine::build },
-    Preset { name: "viaduct", triangles: 56_600, build: viaduct::build },
-    Preset { name: "gorge", triangles: 55_514, build: gorge::build },
-    Preset { name: "saw", triangles: 60_532, build: saw::build },
-    Preset { name: "gold_rush", triangles: 131_598, build: gold_rush::build },
+    Preset { name: "nucleus", triangles: 19_963, least: 14_000, build: nucleus::build },
+    Preset { name: "coal_town", triangles: 25_894, least: 16_000, build: coal_town::build },
+    Preset { name: "ravine", triangles: 33_422, least: 16_000, build: ravine::build },
+    Preset { name: "viaduct", triangles: 56_600, least: 24_000, build: viaduct::build },
+    Preset { name: "gorge", triangles: 55_514, least: 16_000, build: gorge::build },
+    Preset { name: "saw", triangles: 60_532, least: 20_000, build: saw::build },
+    Preset { name: "gold_rush", triangles: 131_598, least: 56_000, build: gold_rush::build },
 ];
 
 pub const ENTRY: Entry<dyn Generator> = Entry {
@@ -66,7 +65,7 @@ pub const ENTRY: Entry<dyn Generator> = Entry {
         Param {
             name: "triangles",
             default: Default::Int { value: 0, min: 0, max: 4_000_000 },
-            about: "exact number of triangles, at least 16,000; 0 takes the published count",
+            about: "exact number of triangles, at least 14,000 to 56,000 by map; 0 takes the published count",
         },
         Param {
             name: "seed",
@@ -76,6 +75,12 @@ pub const ENTRY: Entry<dyn Generator> = Entry {
     ],
     make: |spec| Box::new(Arena::new(spec)),
 };
+
+/// The least number of triangles of a resolved spec's map.
+pub(super) fn least(spec: &Spec) -> i64 {
+    let name = spec.text("map");
+    PRESETS.iter().find(|p| p.name == name).map_or(0, |p| p.least)
+}
 
 struct Arena {
     preset: &'static Preset,
@@ -102,6 +107,9 @@ impl Generator for Arena {
             kit.b.object();
             // The ground gets what the walls leave, but no more than a fifth of all.
             let room = self.triangles.saturating_sub(kit.b.len()) / 2;
+            let paint = |centre: DVec3, normal: DVec3| {
+                if normal.z > 0.85 && kit.ground.on_road(centre) { "road_dirt" } else { paint(centre, normal) }
+            };
             kit.ground.emit(&mut kit.b, bottom, room.min(self.triangles / 5), paint);
             let mut props = kit.props;
             kit.rng.shuffle(&mut props);

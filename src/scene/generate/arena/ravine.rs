@@ -73,7 +73,7 @@ fn covered_bridge(k: &mut Kit) {
 fn side(k: &mut Kit, team: usize) {
     let wall = ["red_barn_boards", "blue_boards"][team];
     k.flatten(30.0, -22.0, 54.0, 24.0, 1.4, 7.0);
-    k.lay(&[v3(18.0, 0.0, 1.2), v3(32.0, 0.0, 1.4)], 3.0, 4.0);
+    k.road(&[v3(18.0, 0.0, 1.2), v3(32.0, 0.0, 1.4)], 3.0, 4.0);
     // The barn, the house, the store and a loft bridge between the first two.
     House {
         width: 20.0,

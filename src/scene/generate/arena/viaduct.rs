@@ -57,7 +57,7 @@ pub(super) fn build(seed: u64) -> Map {
 
 fn side(k: &mut Kit, team: usize) {
     let paint = ["red_chalet", "blue_chalet"][team];
-    k.lay(&[v3(0.0, 9.0, 0.0), v3(0.0, 24.0, 3.4), v3(2.0, 46.0, 3.6)], 3.4, 3.0);
+    k.road(&[v3(0.0, 9.0, 0.0), v3(0.0, 24.0, 3.4), v3(2.0, 46.0, 3.6)], 3.4, 3.0);
     // The base closes the street.
     k.flatten(-14.0, 46.0, 16.0, 60.0, 3.6, 3.0);
     k.at(1.0, 52.0, 3.7, 0, |k| {

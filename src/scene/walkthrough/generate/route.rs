@@ -13,7 +13,16 @@ pub fn stroll(space: &Space, frames: usize, speed: f64, rng: &mut Random) -> Res
     let band: Vec<usize> = (0..space.state.len()).filter(|c| space.state[*c] & BAND != 0).collect();
     // Those at the right height are where goals may be.
     let least = band.iter().map(|c| space.off[*c]).min().unwrap_or(0);
-    let goals: Vec<usize> = band.iter().copied().filter(|c| space.off[*c] == least).collect();
+    let level: Vec<usize> = band.iter().copied().filter(|c| space.off[*c] == least).collect();
+    // The rim of a map is seldom the place that it was made for.
+    let inner = |c: &usize| {
+        let at = space.coordinates(*c);
+        (0..2).all(|i| at[i] * 13 > space.dims[i] && at[i] * 13 < space.dims[i] * 12)
+    };
+    let mut goals: Vec<usize> = level.iter().copied().filter(inner).collect();
+    if goals.len() * 4 < level.len() {
+        goals = level;
+    }
     let mut at = *rng.pick(&goals);
     let mut way = vec![space.centre(at)];
     let mut length = 0.0;

@@ -204,7 +204,7 @@ impl Slab {
     fn mark(&self, corners: &[DVec3; 3], bounds: &Aabb, two_sided: bool, state: &mut [u8]) {
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let up = if two_sided { normal.z.abs() } else { normal.z };
-        let mark = if up > 0.6 * normal.length() { BLOCKED | FLOOR } else { BLOCKED };
+        let mark = if up > 0.72 * normal.length() { BLOCKED | FLOOR } else { BLOCKED };
         // Cells whose grown box may reach the bounds: centre within half of them.
         let cells = |axis: usize, lo: f64, hi: f64| {
             let first = ((lo - self.half - self.lo[axis]) / self.cell - 0.5).ceil() - 1.0;
