@@ -12,6 +12,8 @@ pub mod frustum_volume;
 pub mod frustum_x86;
 pub mod normal_mask;
 pub mod octant_mask;
+#[cfg(target_arch = "x86_64")]
+mod prefetch_x86;
 
 use crate::error::Result;
 use crate::hierarchy::Hierarchy;
