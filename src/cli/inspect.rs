@@ -67,7 +67,7 @@ pub struct Args {
     /// Write the submitted source triangle ids: one a line, ascending, each once, from 0
     #[arg(long, value_name = "FILE")]
     dump_submitted: Option<PathBuf>,
-    /// Picture of the frame beside a plan: lost triangles red, unsubmitted ones pale on the plan
+    /// Picture of the frame beside a plan: submitted triangles blue, lost ones red, the rest pale on the plan
     #[arg(long, value_name = "FILE.png")]
     image: Option<PathBuf>,
     /// Print one JSON document instead of text

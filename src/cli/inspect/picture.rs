@@ -11,9 +11,11 @@ use std::path::Path;
 const HEIGHT: u32 = 720;
 const GAP: u32 = 8;
 const LOST: [u8; 3] = [226, 28, 28];
-const OUTLINE: [u8; 3] = [20, 70, 200];
+/// Not the colours of materials: some of those are red.
+const SUBMITTED: [u8; 3] = [118, 156, 196];
+const OUTLINE: [u8; 3] = [24, 32, 72];
 
-/// Submitted triangles in their own colours, lost ones red; on the plan what was
+/// Submitted triangles blue, lost ones red; on the plan what was
 /// not submitted is pale.
 pub fn write(file: &Path, scene: &Scene, view: &View, submitted: &BitSet, losses: &Losses) -> Result<()> {
     let mut lost = BitSet::new(scene.len());
@@ -22,7 +24,7 @@ pub fn write(file: &Path, scene: &Scene, view: &View, submitted: &BitSet, losses
         if lost.contains(t) {
             Look::Tint(LOST)
         } else if submitted.contains(t) {
-            Look::Plain
+            Look::Tint(SUBMITTED)
         } else {
             rest
         }
