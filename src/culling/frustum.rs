@@ -209,6 +209,10 @@ impl Test for Frustum {
         size_of_val(&self.live[..]) + size_of_val(&self.last[..])
     }
 
+    fn reset(&mut self) {
+        self.last.fill([0; 6]);
+    }
+
     fn begin(&mut self, view: &View, hierarchy: &Hierarchy) {
         self.frame = FramePlanes::new(view, hierarchy.origin);
         self.with_planes = self.node_test != NodeTest::Box && hierarchy.half_spaces.is_some();
