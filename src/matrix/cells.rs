@@ -253,7 +253,8 @@ pub fn impossible(manifest: &Manifest, pool: &Pool, cells: &[Cell], mistakes: &M
             super::labels::label("structure", &value(first, s)),
             super::labels::label("culling", &value(first, c))
         );
-        let many = if struck.len() == 1 { "an impossible cell".into() } else { format!("{} impossible cells", struck.len()) };
+        let many =
+            if struck.len() == 1 { "an impossible cell".into() } else { format!("{} impossible cells", struck.len()) };
         let e = Error::new(format!("has {many}, such as {cell}: {}", rule.why));
         let kind = &value(first, s)[0].kind;
         let exclude = format!("structure = \"{kind}\", culling = \"{}:node_test!=box+*\"", part.kind);
