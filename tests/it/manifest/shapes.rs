@@ -258,3 +258,23 @@ fn ten_thousand_cells_expand_at_once() {
     // Release takes a tenth of this; the bound is for a busy machine in the dev profile.
     assert!(seconds < 4.0, "{seconds} s");
 }
+
+#[test]
+fn the_experiments_of_this_repository_are_free_of_mistakes() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    let mut studies = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap().flatten() {
+        let path = entry.path();
+        if path.extension().is_none_or(|e| e != "toml") {
+            continue;
+        }
+        let told = |errors: Vec<cullmark::Error>| -> String { errors.iter().map(|e| format!("{e}\n")).collect() };
+        let manifest = Manifest::load(&path, &[]).unwrap_or_else(|e| panic!("{}", told(e)));
+        let matrix = expand(&manifest, &Setting::default()).unwrap_or_else(|e| panic!("{}", told(e)));
+        studies.push((manifest.study.name, matrix.runs.len(), manifest.claims.len()));
+    }
+    studies.sort();
+    assert!(studies.contains(&("quick".into(), 30, 1)), "{studies:?}");
+    // Seven maps x (three structures x five cullings + the binary BSP's three).
+    assert!(studies.contains(&("serpa-2014".into(), 7 * 18, 11)), "{studies:?}");
+}
