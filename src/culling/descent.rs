@@ -2,7 +2,7 @@
 //! with the carries of all tests, without recursion and without allocating anew.
 
 use super::{Tally, Test, Verdict};
-use crate::hierarchy::{Hierarchy, LANES};
+use crate::hierarchy::{Hierarchy, LANES, NONE};
 
 /// A block on the way down: the lanes still to be visited, each once, ascending.
 struct Frame {
@@ -86,5 +86,22 @@ impl Descent {
     /// No test has anything left to do below the visited lane.
     pub fn is_settled(&self, at: Visit, test_count: usize) -> bool {
         self.carries[self.carries.len() - test_count..].iter().all(|c| c[at.lane] == 0)
+    }
+}
+
+/// Calls `visit(block, lane)` for every live lane, children before their parent.
+pub(super) fn bottom_up(hierarchy: &Hierarchy, mut visit: impl FnMut(usize, usize)) {
+    // Parents before children, by any order; then backwards.
+    let mut order: Vec<u32> = (0..hierarchy.root_blocks).collect();
+    let mut at = 0;
+    while at < order.len() {
+        let links = &hierarchy.links[order[at] as usize];
+        order
+            .extend((0..LANES).filter(|l| links.live >> l & 1 == 1 && links.child[*l] != NONE).map(|l| links.child[l]));
+        at += 1;
+    }
+    for block in order.into_iter().rev() {
+        let live = hierarchy.links[block as usize].live;
+        (0..LANES).filter(|l| live >> l & 1 == 1).for_each(|l| visit(block as usize, l));
     }
 }

@@ -6,7 +6,7 @@ use crate::hierarchy::{BoundsBlock, LANES};
 
 /// Bounds of one lane relative to the eye (`lo x, lo y, lo z, hi x, hi y, hi z`) and the guard.
 #[inline]
-fn relative(frame: &FramePlanes, bounds: &BoundsBlock, lane: usize) -> ([f32; 6], f32) {
+pub fn relative(frame: &FramePlanes, bounds: &BoundsBlock, lane: usize) -> ([f32; 6], f32) {
     let mut a = [0f32; 6];
     let mut magnitude = [0f32; 3];
     for axis in 0..3 {
@@ -17,8 +17,9 @@ fn relative(frame: &FramePlanes, bounds: &BoundsBlock, lane: usize) -> ([f32; 6]
     (a, ((magnitude[0] + magnitude[1]) + magnitude[2]) * GUARD)
 }
 
+/// Signed distance of a corner of the box from a plane, as every kernel computes it.
 #[inline]
-fn value(plane: &Plane32, a: &[f32; 6], corner: &[usize; 3], d: f32) -> f32 {
+pub fn value(plane: &Plane32, a: &[f32; 6], corner: &[usize; 3], d: f32) -> f32 {
     let [nx, ny, nz] = plane.normal;
     ((nx * a[corner[0]] + ny * a[corner[1]]) + nz * a[corner[2]]) + d
 }

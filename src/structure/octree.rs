@@ -90,14 +90,12 @@ pub struct Octree {
 impl Structure for Octree {
     fn build(&self, scene: &Scene) -> Result<Hierarchy> {
         let root = self.root_cell(scene);
-        let mut h = match self.policy {
-            Policy::Loose => self.build_loose(scene, &root),
-            Policy::Enclose => self.build_enclosing(scene, &root),
-            Policy::Replicate => cut::build_replicated(scene, &root, self.depth, self.leaf_limit)?,
-            Policy::Split => cut::build_split(scene, &root, self.depth, self.leaf_limit)?,
-        };
-        h.stats.oversized_leaves *= u64::from(self.leaf_limit > 0);
-        Ok(h)
+        match self.policy {
+            Policy::Loose => Ok(self.build_loose(scene, &root)),
+            Policy::Enclose => Ok(self.build_enclosing(scene, &root)),
+            Policy::Replicate => cut::build_replicated(scene, &root, self.depth, self.leaf_limit),
+            Policy::Split => cut::build_split(scene, &root, self.depth, self.leaf_limit),
+        }
     }
 }
 

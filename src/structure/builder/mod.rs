@@ -3,6 +3,7 @@
 
 pub mod cut;
 pub mod morton;
+pub mod piece;
 
 use crate::hierarchy::{BoundsBlock, BuildStats, HalfSpace, Hierarchy, LANES, LinkBlock, NONE};
 use crate::math::{Aabb, Box32, DVec3};
