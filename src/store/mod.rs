@@ -16,9 +16,12 @@ pub mod artifacts;
 mod blob;
 pub mod compact;
 mod error;
+mod fetch;
+mod noise;
 mod owner;
 pub mod queue;
 pub mod read;
+mod rows;
 pub mod settle;
 pub mod submit;
 
