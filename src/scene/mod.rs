@@ -1,13 +1,17 @@
 //! Scenes: triangles in f64 metres with what every method needs to know of them,
 //! and how they come to be (files, generators) or are walked through (camera paths).
 
+pub mod cache;
 pub mod generate;
 pub mod gltf;
 pub mod load;
+pub mod mtl;
 pub mod obj;
+pub mod placement;
 pub mod sanitise;
 pub mod walkthrough;
 pub mod winding;
+pub mod write;
 
 use crate::math::{Aabb, Box32, DVec3};
 use serde::{Deserialize, Serialize};
