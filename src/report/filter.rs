@@ -186,7 +186,9 @@ impl Parser<'_> {
                 Op::Equal | Op::In => Op::Range,
                 Op::Unequal | Op::NotIn => Op::OutsideRange,
                 _ => {
-                    return Err(at_column(self.text, column, "a range goes with =, != or in").help("write depth = 3..5"));
+                    return Err(
+                        at_column(self.text, column, "a range goes with =, != or in").help("write depth = 3..5")
+                    );
                 }
             };
         }

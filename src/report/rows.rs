@@ -60,7 +60,17 @@ pub fn draw(grid: &Grid, legend: &Legend, what: &Rows) -> Figure {
         .map(|row| row.iter().map(|cell| cell.filter(|r| r.status == RunStatus::Done).and_then(what.datum)).collect())
         .collect();
     let extent: Vec<f64> = data.iter().flatten().flatten().flat_map(Datum::extent).collect();
-    let scale = if what.linear { Scale::from_zero(extent) } else { Scale::fitting(&extent) };
+    // Those that cull nothing cost next to nothing: they must not decide for a logarithm.
+    let working: Vec<f64> = grid
+        .cells
+        .iter()
+        .zip(&data)
+        .flat_map(|(cells, data)| cells.iter().zip(data))
+        .filter(|(cell, _)| cell.is_some_and(|r| r.culling != "none"))
+        .flat_map(|(_, datum)| datum.iter().flat_map(Datum::extent))
+        .collect();
+    let linear = what.linear || !Scale::fitting(&working).is_log();
+    let scale = if linear { Scale::from_zero(extent) } else { Scale::log(extent) };
 
     let names = grid.combinations.iter().map(|l| font::width(l, BODY, false)).fold(0.0, f64::max);
     let left = 16.0 + names + 14.0;

@@ -103,7 +103,9 @@ pub fn load(spec: &SceneSpec) -> Result<Scene> {
         if let SceneSource::File(path) = &spec.source {
             e = e.in_file(path);
         }
-        return Err(e.help("a scene needs faces with area and finite coordinates; `cullmark scene info` shows what is there"));
+        return Err(
+            e.help("a scene needs faces with area and finite coordinates; `cullmark scene info` shows what is there")
+        );
     }
     Ok(scene)
 }
@@ -180,7 +182,9 @@ impl Format {
 
 fn read_file(path: &Path) -> Result<Vec<u8>> {
     if path.is_dir() {
-        return Err(Error::new("is a folder, but a scene is a file").in_file(path).help("name the .obj, .gltf or .glb in it"));
+        return Err(Error::new("is a folder, but a scene is a file")
+            .in_file(path)
+            .help("name the .obj, .gltf or .glb in it"));
     }
     let bytes = std::fs::read(path).map_err(|e| {
         let error = Error::io(path, "cannot read the scene", &e);

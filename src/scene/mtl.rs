@@ -64,8 +64,10 @@ mod tests {
 
     #[test]
     fn dissolve_transparency_and_maps_make_a_material_see_through() {
-        let m = parse(b"newmtl wall\nKd 1\nnewmtl glass\nd 0.5\nnewmtl halo\nd -halo 0.2\nnewmtl leaf\nmap_d leaf.png\n\
-            newmtl smoke\nTr 0.4\nnewmtl solid paint\nd 1.0\nTr 0\n");
+        let m = parse(
+            b"newmtl wall\nKd 1\nnewmtl glass\nd 0.5\nnewmtl halo\nd -halo 0.2\nnewmtl leaf\nmap_d leaf.png\n\
+            newmtl smoke\nTr 0.4\nnewmtl solid paint\nd 1.0\nTr 0\n",
+        );
         let opaque: Vec<_> = ["wall", "glass", "halo", "leaf", "smoke", "solid paint"].map(|n| m[n].opaque).into();
         assert_eq!(opaque, [true, false, false, false, false, true]);
         assert!(parse(b"d 0.5\n\xff\xfe newmtl").is_empty(), "statements before a name change nothing");

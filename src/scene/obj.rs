@@ -28,8 +28,7 @@ pub fn read(path: &Path, bytes: &[u8]) -> Result<Scene> {
     // One tobj model with corners as they are: polygons are cut up here, where the shape is known.
     let options = tobj::LoadOptions { single_index: false, ..Default::default() };
     let mut reader = &survey.clean[..];
-    let (models, _) =
-        tobj::load_obj_buf(&mut reader, &options, |_| Ok(Default::default())).map_err(located)?;
+    let (models, _) = tobj::load_obj_buf(&mut reader, &options, |_| Ok(Default::default())).map_err(located)?;
     let mesh = &models.first().expect("tobj always closes its last model").mesh;
     let mut scene = Scene {
         positions: mesh.positions.chunks_exact(3).map(DVec3::from_slice).collect(),
@@ -283,7 +282,11 @@ fn locate(bytes: &[u8], cause: &tobj::LoadError) -> Error {
             _ => None,
         };
         if let Some(message) = wrong {
-            let help = if ended { "correct the line, or export the file again" } else { "the file was probably cut short: copy or export it again" };
+            let help = if ended {
+                "correct the line, or export the file again"
+            } else {
+                "the file was probably cut short: copy or export it again"
+            };
             return Error::new(message).at(number, None).help(help);
         }
     }

@@ -86,10 +86,12 @@ pub fn walks(scene: &Scene, count: usize, steps: usize, seed: u64, grow: f64) ->
     for _ in 0..steps {
         let rays: Vec<Ray> = at
             .iter()
-            .map(|p| loop {
-                let d = DVec3::new(unit(), unit(), unit()) * 2.0 - 1.0;
-                if (1e-3..=1.0).contains(&d.length_squared()) {
-                    break Ray { from: *p, direction: d.normalize() };
+            .map(|p| {
+                loop {
+                    let d = DVec3::new(unit(), unit(), unit()) * 2.0 - 1.0;
+                    if (1e-3..=1.0).contains(&d.length_squared()) {
+                        break Ray { from: *p, direction: d.normalize() };
+                    }
                 }
             })
             .collect();
@@ -100,7 +102,11 @@ pub fn walks(scene: &Scene, count: usize, steps: usize, seed: u64, grow: f64) ->
                 Some(hit) => {
                     let front = scene.normal(hit.triangle).dot(ray.direction) < 0.0;
                     w.met.push(hit.triangle);
-                    if front { w.front += 1 } else { w.back += 1 }
+                    if front {
+                        w.front += 1
+                    } else {
+                        w.back += 1
+                    }
                     hit.t
                 }
                 None => {

@@ -22,7 +22,9 @@ pub fn write(path: &Path, scene: &Scene) -> Result<Vec<String>> {
         Some("obj") => obj(scene),
         Some("glb") => glb(scene)?,
         _ => {
-            return Err(Error::new("cannot tell the format from the name").in_file(path).help("end it in .obj or .glb"));
+            return Err(Error::new("cannot tell the format from the name")
+                .in_file(path)
+                .help("end it in .obj or .glb"));
         }
     };
     std::fs::write(path, bytes).map_err(|e| Error::io(path, "cannot write the scene", &e))?;
@@ -49,7 +51,8 @@ pub fn obj(scene: &Scene) -> (Vec<u8>, Vec<String>) {
         let _ = writeln!(text, "f {} {} {}", u64::from(*a) + 1, u64::from(*b) + 1, u64::from(*c) + 1);
     }
     let lost = scene.two_sided.iter().zip(&scene.occluder).filter(|(two, occludes)| **two || !**occludes).count();
-    let note = format!("OBJ has no double-sided or alpha flags: {lost} triangles lost theirs (write .glb to keep them)");
+    let note =
+        format!("OBJ has no double-sided or alpha flags: {lost} triangles lost theirs (write .glb to keep them)");
     (text.into_bytes(), if lost > 0 { vec![note] } else { Vec::new() })
 }
 
@@ -95,7 +98,9 @@ pub fn glb(scene: &Scene) -> Result<(Vec<u8>, Vec<String>)> {
     for run in runs(scene) {
         if last_object.replace(run.object) != Some(run.object) {
             let translation = origin.to_array();
-            nodes.push(json!({ "mesh": meshes.len(), "name": format!("object_{}", run.object), "translation": translation }));
+            nodes.push(
+                json!({ "mesh": meshes.len(), "name": format!("object_{}", run.object), "translation": translation }),
+            );
             meshes.push(Vec::new());
         }
         let material = *material_of.entry(run.look).or_insert_with(|| {
@@ -156,9 +161,8 @@ fn pack(mut json: Vec<u8>, mut bin: Vec<u8>) -> Result<Vec<u8>> {
     json.resize(json.len().next_multiple_of(4), b' ');
     bin.resize(bin.len().next_multiple_of(4), 0);
     let length = 12 + 8 + json.len() + 8 + bin.len();
-    let length = u32::try_from(length).map_err(|_| {
-        Error::new("the scene needs more than 4 GiB, which GLB cannot hold").help("write .obj instead")
-    })?;
+    let length = u32::try_from(length)
+        .map_err(|_| Error::new("the scene needs more than 4 GiB, which GLB cannot hold").help("write .obj instead"))?;
     let mut out = Vec::with_capacity(length as usize);
     out.extend_from_slice(b"glTF");
     out.extend_from_slice(&2u32.to_le_bytes());
@@ -174,6 +178,7 @@ fn pack(mut json: Vec<u8>, mut bin: Vec<u8>) -> Result<Vec<u8>> {
 /// Greatest distance between the corners of two scenes with as many triangles, in
 /// order: what a conversion cost.
 pub fn greatest_shift_m(a: &Scene, b: &Scene) -> Option<f64> {
-    let far = |t: u32| a.corners(t).iter().zip(b.corners(t)).map(|(p, q): (&DVec3, DVec3)| p.distance(q)).fold(0.0, f64::max);
+    let far =
+        |t: u32| a.corners(t).iter().zip(b.corners(t)).map(|(p, q): (&DVec3, DVec3)| p.distance(q)).fold(0.0, f64::max);
     (a.len() == b.len()).then(|| (0..a.len() as u32).map(far).fold(0.0, f64::max))
 }

@@ -72,7 +72,8 @@ impl<'a> Accessors<'a> {
             let replaced = self.items(&v.view(), v.offset(), count, size, &item).map_err(at)?;
             for (i, value) in indices.into_iter().zip(replaced) {
                 *values.get_mut(i as usize).ok_or_else(|| {
-                    at(Error::new(format!("sparse index {i} is out of range")).help("the file is damaged: export it again"))
+                    at(Error::new(format!("sparse index {i} is out of range"))
+                        .help("the file is damaged: export it again"))
                 })? = value;
             }
         }

@@ -63,7 +63,9 @@ pub fn load<'a>(document: &gltf::Document, path: &Path, blob: Option<&'a [u8]>) 
                             .help("the file was probably cut short, or is a .glb renamed .gltf"));
                     }
                 },
-                Source::Uri(uri) if uri.starts_with("data:") => ("its data URI".to_string(), Cow::Owned(data_uri(uri, n)?)),
+                Source::Uri(uri) if uri.starts_with("data:") => {
+                    ("its data URI".to_string(), Cow::Owned(data_uri(uri, n)?))
+                }
                 Source::Uri(uri) => {
                     let file = beside(path, uri, n)?;
                     let bytes = std::fs::read(&file).map_err(|e| {

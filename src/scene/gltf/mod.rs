@@ -75,7 +75,9 @@ fn parse(json: &[u8]) -> Result<gltf::Document> {
     if let Some(e) = root.extensions_required.iter().find(|e| !harmless(e)) {
         let help = match e.as_str() {
             "KHR_draco_mesh_compression" => "decompress it: gltf-transform copy in.glb out.glb",
-            "EXT_meshopt_compression" | "KHR_meshopt_compression" => "decompress it: gltf-transform copy in.glb out.glb",
+            "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+                "decompress it: gltf-transform copy in.glb out.glb"
+            }
             "KHR_mesh_quantization" => "store positions as floats: gltf-transform dequantize in.glb out.glb",
             _ => "export it again without this extension",
         };
@@ -131,7 +133,8 @@ impl Builder<'_> {
                 self.skinned += u32::from(node.skin().is_some());
                 self.placed.clear();
                 for primitive in mesh.primitives() {
-                    let place = || format!("node {}, mesh {}, primitive {}", node.index(), mesh.index(), primitive.index());
+                    let place =
+                        || format!("node {}, mesh {}, primitive {}", node.index(), mesh.index(), primitive.index());
                     self.primitive(&primitive, &to_world).map_err(|e| e.key(place()))?;
                 }
                 self.object += 1;

@@ -92,19 +92,12 @@ fn columns(header: &str) -> Result<[usize; 10]> {
     }
     let mut order = [0; 10];
     for (at, name) in order.iter_mut().zip(COLUMNS) {
-        *at = names
-            .iter()
-            .position(|n| *n == name)
-            .ok_or_else(|| Error::new(format!("column `{name}` is missing")))?;
+        *at = names.iter().position(|n| *n == name).ok_or_else(|| Error::new(format!("column `{name}` is missing")))?;
     }
     Ok(order)
 }
 
-fn frame<'a>(
-    field: &impl Fn(usize) -> (&'a str, Option<u32>),
-    line: u32,
-    before: Option<&Frame>,
-) -> Result<Frame> {
+fn frame<'a>(field: &impl Fn(usize) -> (&'a str, Option<u32>), line: u32, before: Option<&Frame>) -> Result<Frame> {
     let wrong = |column: usize, message: String| Error::new(message).at(line, field(column).1).key(COLUMNS[column]);
     let text = field(0).0;
     let number = text
@@ -113,8 +106,9 @@ fn frame<'a>(
     if let Some(before) = before
         && number <= before.number
     {
-        return Err(wrong(0, format!("frame {number} comes after frame {}", before.number))
-            .help("frame numbers must ascend"));
+        return Err(
+            wrong(0, format!("frame {number} comes after frame {}", before.number)).help("frame numbers must ascend")
+        );
     }
     let mut vectors = [DVec3::ZERO; 3];
     for column in 1..COLUMNS.len() {
@@ -137,7 +131,9 @@ fn frame<'a>(
     };
     let (forward, up) = (unit(forward, 4, "forward")?, unit(up, 7, "up")?);
     if forward.cross(up).length() < MIN_SINE {
-        return Err(wrong(7, "up is parallel to forward".to_string()).help("up must point to the upper edge of the image"));
+        return Err(
+            wrong(7, "up is parallel to forward".to_string()).help("up must point to the upper edge of the image")
+        );
     }
     Ok(Frame { number, pose: Pose { eye, forward, up } })
 }
