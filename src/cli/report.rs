@@ -15,7 +15,7 @@ pub struct Args {
     /// Database with the results
     #[arg(long, value_name = "FILE", default_value = store::DEFAULT_DB)]
     pub db: PathBuf,
-    /// Folder of the report [default: reports/STUDY]
+    /// Folder of the report (default: beside the database, named as the study)
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
@@ -28,7 +28,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Some(manifest) => manifest.claims(),
         None => stored_claims(&args.db, &study)?,
     };
-    let out = args.out.unwrap_or_else(|| Path::new("reports").join(report::format::slug(&study)));
+    let beside = args.db.parent().unwrap_or(Path::new("")).join(&study);
+    let out = args.out.unwrap_or(beside);
     let files = report::write(&results, &claims, &out)?;
     println!(
         "{} ({} charts as SVG and PNG, {} tables as CSV, Markdown and LaTeX)",
