@@ -14,7 +14,7 @@ const RAYS: usize = 512;
 const MIN_HITS: u32 = 16;
 /// Larger scenes go unprobed: a probe may cost a second, not a minute.
 const MAX_TRIANGLES: usize = 30_000_000;
-const SEED: u64 = 0x77_69_6e_64;
+const SEED: u64 = 0x7769_6e64;
 
 #[derive(Debug, Clone, Copy)]
 pub struct Ray {
