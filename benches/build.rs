@@ -176,8 +176,8 @@ impl Pointer {
     }
 
     fn divide(scene: &Scene, triangles: Vec<u32>, lo: DVec3, hi: DVec3, depth: u32) -> Pointer {
-        let mut node = Pointer::default();
-        node.bounds = triangles.iter().map(|t| scene.triangle_box(*t)).reduce(Box32::union);
+        let bounds = triangles.iter().map(|t| scene.triangle_box(*t)).reduce(Box32::union);
+        let mut node = Pointer { bounds, ..Pointer::default() };
         if depth == 0 {
             node.triangles = triangles;
             return node;
