@@ -1,6 +1,9 @@
 //! Manifests and their matrices: what is read, what is refused and how it is said.
 
 mod mistakes;
+mod mistakes_matrix;
+mod mistakes_rules;
+mod mistakes_sections;
 mod shapes;
 
 use cullmark::Error;
