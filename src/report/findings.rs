@@ -34,6 +34,8 @@ fn fastest(grid: &Grid, done: &[&RunResult], metric: &Metric, working: bool) -> 
     let base = combination(grid.results, base);
     sentence += &match (low, high) {
         _ if low <= 1.0 && high >= 1.0 => format!(" (not distinguishable from {base})"),
+        // 1.00 times faster is no finding, however sure.
+        _ if r < 1.005 => format!(" (within 0.5 % of {base})"),
         _ if low == high => format!(" ({} faster than {base})", format::ratio(r)),
         _ => format!(
             " ({} [{}, {}] faster than {base})",
