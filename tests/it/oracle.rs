@@ -300,3 +300,32 @@ fn dense_sampling_never_contradicts_the_exact_frustum_set() {
         }
     }
 }
+
+#[test]
+fn a_sample_exactly_on_shared_edges_and_corners_belongs_to_one_triangle() {
+    // Every coordinate is a multiple of 1/64, so that all edge functions are exact:
+    // corners, sides and diagonals of the mesh run through sample centres.
+    let camera =
+        Camera { projection: Projection::Orthographic { height_m: 2.0 }, aspect: 1.0, near_m: 1.0, far_m: None };
+    let at = |i: u32, j: u32| {
+        let centre = |k: u32| f64::from(2 * k + 1) / 64.0 - 1.0;
+        DVec3::new(4.0, centre(i), centre(j))
+    };
+    let mut scene = empty();
+    for i in (4..60).step_by(8) {
+        for j in (4..60).step_by(8) {
+            let [a, b, c, d] = [at(i, j), at(i + 8, j), at(i + 8, j + 8), at(i, j + 8)];
+            push(&mut scene, [a, c, b], true, true);
+            push(&mut scene, [a, d, c], true, true);
+        }
+    }
+    let t = truth_of(&scene, &camera, ahead(), &accuracy(64, 64, 1));
+    for (index, tile) in (0u32..).zip(&t.tiles) {
+        tile.for_each(t.grid.tile(index), |run| assert_eq!(run.alternate, BACKGROUND, "covered twice: {run:?}"));
+    }
+    // 7 cells of 8 samples a side: of the two border lines exactly one counts.
+    assert_eq!(t.covered_pixels, 56 * 56);
+    let areas: Vec<u32> = t.visible.iter().map(|(_, n)| *n).collect();
+    assert_eq!(areas.iter().sum::<u32>(), 56 * 56);
+    assert!(areas.len() == 98 && areas.iter().all(|n| *n == 28 || *n == 36), "a diagonal goes to one side: {areas:?}");
+}
