@@ -109,31 +109,30 @@ pub fn render(scene: &Scene, view: &View, width: u32, height: u32, style: &Style
             Look::Ghost => DVec3::splat(0.85),
             _ => palette.get(scene.material_id[id as usize] as usize).copied().unwrap_or(DVec3::splat(0.7)),
         };
-        let lit = sun.as_ref().is_none_or(|s| s.lights(p + normal * 0.05));
-        let lambert = normal.dot(SUN).max(0.0) * if lit { 1.0 } else { 0.12 };
+        let lit = sun.as_ref().map_or(1.0, |s| s.light(p + normal * 0.05));
+        let lambert = normal.dot(SUN).max(0.0) * (0.1 + 0.9 * lit);
         let sky_light = 0.5 + 0.5 * normal.z;
         let fill = normal.dot(DVec3::new(-0.5, 0.4, 0.2)).max(0.0);
         let rise = if bounds.size().z > 0.0 { (p.z - bounds.lo.z) / bounds.size().z } else { 0.5 };
-        let light = 0.30 + 0.20 * sky_light + 0.12 * fill + 0.62 * lambert;
+        let light = 0.36 + 0.20 * sky_light + 0.14 * fill + 0.58 * lambert;
         base * light * (0.94 + 0.10 * rise)
     };
     let contact = |x: usize, y: usize| -> f64 {
-        // Darkens pixels that lie behind a near neighbour: a poor man's ambient occlusion.
-        let q = f64::from(buffers.q[y * w + x]);
-        let reach = (s as usize) * 3;
-        let mut hidden = 0.0;
-        for (dx, dy) in [(reach, 0), (0, reach), (reach, reach)] {
-            for (nx, ny) in [(x.wrapping_sub(dx), y.wrapping_sub(dy)), (x + dx, y + dy)] {
-                if nx < w && ny < h {
-                    let n = f64::from(buffers.q[ny * w + nx]);
-                    let step = if view.is_perspective() { n / q.max(1e-9) - 1.0 } else { (n - q) * 0.5 };
-                    if step > 0.02 {
-                        hidden += 1.0 / 6.0;
-                    }
-                }
-            }
+        // Darkens hollows, a poor man's ambient occlusion: `q` is linear over a plane,
+        // so opposite neighbours that are nearer on average mean a concave place.
+        let at = |x: usize, y: usize| f64::from(buffers.q[y * w + x]);
+        let (q, reach) = (at(x, y), s as usize * 3);
+        if x < reach || y < reach || x + reach >= w || y + reach >= h {
+            return 1.0;
         }
-        1.0 - 0.28 * hidden
+        let hollow = |a: f64, b: f64| {
+            let rise = (a + b) * 0.5 - q;
+            let relative = if view.is_perspective() { rise / q.max(1e-9) * 12.0 } else { rise };
+            if relative.is_finite() { relative.clamp(0.0, 1.0) } else { 0.0 }
+        };
+        let across = hollow(at(x - reach, y), at(x + reach, y));
+        let along = hollow(at(x, y - reach), at(x, y + reach));
+        1.0 - 0.22 * across.max(along)
     };
     let mut rgba = vec![255u8; (width * height * 4) as usize];
     rgba.par_chunks_mut(width as usize * 4).enumerate().for_each(|(y, row)| {
@@ -289,7 +288,7 @@ struct Sun {
 
 impl Sun {
     fn new(scene: &Scene, style: &Style, looks: &[Look]) -> Sun {
-        let size = 2048;
+        let size = 4096;
         let bounds = scene.bounds();
         let (centre, reach) = (bounds.centre(), bounds.size().length().max(1e-3));
         let camera =
@@ -299,12 +298,21 @@ impl Sun {
         Sun { buffers: rasterise(scene, &view, size, size, &style, looks), view, size }
     }
 
-    fn lights(&self, p: DVec3) -> bool {
+    /// Share of the texels about a point that the sun reaches.
+    fn light(&self, p: DVec3) -> f64 {
         let c = self.view.to_camera(p);
-        let x = ((c.x / self.view.half_width * 0.5 + 0.5) * self.size as f64) as usize;
-        let y = ((0.5 - c.y / self.view.half_height * 0.5) * self.size as f64) as usize;
+        let x = (c.x / self.view.half_width * 0.5 + 0.5) * self.size as f64 - 0.5;
+        let y = (0.5 - c.y / self.view.half_height * 0.5) * self.size as f64 - 0.5;
         let texel = 2.0 * self.view.half_height / self.size as f64;
-        x >= self.size || y >= self.size || f64::from(self.buffers.q[y * self.size + x]) < -c.z + 2.5 * texel
+        let reached = |dx: f64, dy: f64| {
+            let (x, y) = ((x.floor() + dx) as usize, (y.floor() + dy) as usize);
+            let within = x < self.size && y < self.size;
+            f64::from(!within || f64::from(self.buffers.q[y * self.size + x]) < -c.z + 2.5 * texel)
+        };
+        let (s, t) = (x - x.floor(), y - y.floor());
+        let low = reached(0.0, 0.0) * (1.0 - s) + reached(1.0, 0.0) * s;
+        let high = reached(0.0, 1.0) * (1.0 - s) + reached(1.0, 1.0) * s;
+        low * (1.0 - t) + high * t
     }
 }
 
@@ -332,6 +340,8 @@ fn material_colour(scene: &Scene, material: u32) -> DVec3 {
         ("glass", [150, 190, 205]),
         ("foliage", [84, 118, 74]),
         ("pine", [66, 98, 78]),
+        ("frosted", [158, 182, 176]),
+        ("road", [182, 152, 114]),
         ("bark", [104, 80, 62]),
         ("red", [184, 74, 64]),
         ("blue", [82, 116, 164]),
@@ -349,7 +359,9 @@ fn material_colour(scene: &Scene, material: u32) -> DVec3 {
         ("paint", [138, 154, 138]),
     ];
     let name = scene.material_names.get(material as usize).map(|n| n.to_lowercase()).unwrap_or_default();
-    if let Some((_, c)) = KNOWN.iter().filter(|(word, _)| name.contains(word)).max_by_key(|(word, _)| word.len()) {
+    // The first word that we know says what it is made of: `snow_roof` is white.
+    let known = KNOWN.iter().filter_map(|(word, c)| Some((name.find(word)?, usize::MAX - word.len(), c)));
+    if let Some((_, _, c)) = known.min() {
         return rgb(*c);
     }
     // Steps by the golden angle: neighbours in number are far apart in hue.
@@ -369,18 +381,30 @@ pub fn overview(bounds: &Aabb, azimuth_rad: f64, elevation_rad: f64, aspect: f64
         libm::sin(elevation_rad),
     );
     let up = if elevation_rad.abs() > 1.5 { DVec3::Y } else { DVec3::Z };
-    let centre = bounds.centre();
-    let probe = View::new(&camera, &Pose { eye: centre, forward: -back, up });
     let size = bounds.size();
-    // The least distance at which every corner of the box is within the view.
-    let distance = (0..8)
+    let corners: Vec<DVec3> = (0..8)
         .map(|i| {
             let pick = |bit: u32, s: f64| if i >> bit & 1 == 1 { s * 0.5 } else { -s * 0.5 };
-            let c = probe.to_camera(centre + DVec3::new(pick(0, size.x), pick(1, size.y), pick(2, size.z)));
-            (c.x.abs() / probe.half_width).max(c.y.abs() / probe.half_height) - c.z
+            bounds.centre() + DVec3::new(pick(0, size.x), pick(1, size.y), pick(2, size.z))
         })
-        .fold(0.0, f64::max);
-    View::new(&camera, &Pose { eye: centre + back * (distance * 1.02 + 1e-3), forward: -back, up })
+        .collect();
+    // From far enough, then nearer by turns: move so that the picture of the box is
+    // in the middle, and up to where it just fits.
+    let mut eye = bounds.centre() + back * (size.length() * 2.0 + 1e-3);
+    for _ in 0..12 {
+        let view = View::new(&camera, &Pose { eye, forward: -back, up });
+        let seen: Vec<DVec3> = corners.iter().map(|c| view.to_camera(*c)).collect();
+        let fold = |f: &dyn Fn(&DVec3) -> f64| {
+            seen.iter().map(f).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
+        };
+        let (x, y) = (fold(&|c| c.x / c.z / view.half_width), fold(&|c| c.y / c.z / view.half_height));
+        let depth = fold(&|c| c.z).0;
+        let fill = ((x.1 - x.0) * 0.5).max((y.1 - y.0) * 0.5) / 0.96;
+        let shift =
+            view.right * ((x.0 + x.1) * 0.5 * view.half_width) + view.up * ((y.0 + y.1) * 0.5 * view.half_height);
+        eye += (shift + view.forward * ((1.0 - fill) * 0.7)) * depth;
+    }
+    View::new(&camera, &Pose { eye, forward: -back, up })
 }
 
 /// An orthographic plan from straight above, +y up the page.

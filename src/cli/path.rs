@@ -110,8 +110,10 @@ fn info(a: &InfoArgs) -> anyhow::Result<ExitCode> {
     if let Some(share) = winding::probe_from(&scene, &eyes).share() {
         println!("  front hits   {share:.3} of first hits seen from these eyes");
     }
-    if outside * 2 > eyes.len() {
-        eprintln!("warning: most eyes are outside the scene: do path and scene share units and axes (--up, --scale)?");
+    // Orbits run outside; what is many sizes away has other units or axes.
+    let reach = bounds.size().length() * 4.0;
+    if eyes.iter().filter(|e| e.distance(bounds.centre()) > reach).count() * 2 > eyes.len() {
+        eprintln!("warning: most eyes are far from the scene: do path and scene share units and axes (--up, --scale)?");
     }
     if let Some(w) = winding::warning_from(&scene, &eyes, spec.winding) {
         eprintln!("warning: {w}");

@@ -32,7 +32,7 @@ pub struct Part {
     pub params: &'static [Param],
 }
 
-fn parts<T: ?Sized>(entries: &'static [Entry<T>]) -> Vec<Part> {
+pub fn parts<T: ?Sized>(entries: &'static [Entry<T>]) -> Vec<Part> {
     entries.iter().map(|e| Part { name: e.name, revision: e.revision, params: e.params }).collect()
 }
 

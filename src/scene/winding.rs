@@ -1,20 +1,20 @@
 //! Does the stated winding look right? Random rays are cast through the scene;
-//! from free space nearly every first hit should show a front. Naive on purpose
-//! (every ray against every triangle), with a bound on its cost.
+//! from free space nearly every first hit should show a front.
 
 use super::Scene;
-use crate::math::DVec3;
+use crate::math::{Aabb, DVec3};
 use crate::record::Winding;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 use rayon::prelude::*;
 
-/// Ray-triangle tests that a probe may cost: about a quarter of a second on one core.
-const BUDGET: usize = 1 << 27;
-/// Fewer rays than this say nothing; larger scenes go unprobed.
-const MIN_RAYS: usize = 32;
-const MAX_RAYS: usize = 512;
-const SEED: u64 = 0x77_69_6e_64;
+/// Rays of a probe: the share is then good to about 0.03.
+const RAYS: usize = 512;
+/// Fewer hits than this say nothing.
+const MIN_HITS: u32 = 16;
+/// Larger scenes go unprobed: a probe may cost a second, not a minute.
+const MAX_TRIANGLES: usize = 30_000_000;
+const SEED: u64 = 0x7769_6e64;
 
 #[derive(Debug, Clone, Copy)]
 pub struct Ray {
@@ -29,40 +29,89 @@ pub struct Hit {
     pub triangle: u32,
 }
 
-/// Nearest hits of all rays, in their order. Ties go to the lower triangle, so
-/// the result does not depend on the number of threads.
-pub fn first_hits(scene: &Scene, rays: &[Ray]) -> Vec<Option<Hit>> {
-    let nearer = |a: Option<Hit>, b: Option<Hit>| match (a, b) {
-        (Some(x), Some(y)) => Some(if (y.t, y.triangle) < (x.t, x.triangle) { y } else { x }),
-        (x, y) => x.or(y),
-    };
-    (0..scene.len())
-        .into_par_iter()
-        .fold(
-            || vec![None; rays.len()],
-            |mut best: Vec<Option<Hit>>, t| {
-                let [a, b, c] = scene.corners(t as u32);
-                let (e, f) = (b - a, c - a);
-                let n = e.cross(f);
-                for (ray, best) in rays.iter().zip(&mut best) {
-                    // Möller and Trumbore 1997, the plane first: most rays end there.
-                    let det = -n.dot(ray.direction);
-                    let s = ray.from - a;
-                    let distance = n.dot(s) / det;
-                    let far = best.map_or(f64::INFINITY, |h| h.t);
-                    if !(distance > 0.0 && distance <= far) {
-                        continue;
-                    }
-                    let m = s.cross(ray.direction);
-                    let (u, v) = (f.dot(m) / det, -e.dot(m) / det);
-                    if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
-                        *best = nearer(*best, Some(Hit { t: distance, triangle: t as u32 }));
-                    }
+impl Ray {
+    /// Möller and Trumbore 1997. Edge hits count, edge-on triangles do not.
+    fn hit(&self, [a, b, c]: [DVec3; 3]) -> Option<f64> {
+        let (e, f) = (b - a, c - a);
+        let n = e.cross(f);
+        let det = -n.dot(self.direction);
+        let s = self.from - a;
+        let t = n.dot(s) / det;
+        if !(t > 0.0 && t < f64::INFINITY) {
+            return None;
+        }
+        let m = s.cross(self.direction);
+        let (u, v) = (f.dot(m) / det, -e.dot(m) / det);
+        (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then_some(t)
+    }
+
+    /// Where the ray enters a box that it meets before `far`; the far side is moved
+    /// out by a few roundings, so that no triangle in the box is missed (Ize 2013).
+    fn enters(&self, b: &Aabb, far: f64) -> bool {
+        let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
+        for axis in 0..3 {
+            let (from, d) = (self.from[axis], self.direction[axis]);
+            if d == 0.0 {
+                // Along the slab: in it, walls included, or never.
+                if from < b.lo[axis] || from > b.hi[axis] {
+                    return false;
                 }
-                best
-            },
-        )
-        .reduce(|| vec![None; rays.len()], |a, b| a.into_iter().zip(b).map(|(x, y)| nearer(x, y)).collect())
+                continue;
+            }
+            let (s, t) = ((b.lo[axis] - from) / d, (b.hi[axis] - from) / d);
+            enter = enter.max(s.min(t));
+            leave = leave.min(s.max(t));
+        }
+        enter <= leave * (1.0 + 8.0 * f64::EPSILON) && enter <= far * (1.0 + 8.0 * f64::EPSILON)
+    }
+}
+
+/// Triangles a block of [`first_hits`].
+const BLOCK: usize = 64;
+
+/// Nearest hits of all rays, in their order. Ties go to the lower triangle, so
+/// the result does not depend on the number of threads. Triangles are taken in
+/// blocks along a Z-order curve (Morton 1966) and blocks passed over by their
+/// bounds: no tree, and ten to thirty times less work.
+pub fn first_hits(scene: &Scene, rays: &[Ray]) -> Vec<Option<Hit>> {
+    let bounds = scene.bounds();
+    let cell = 256.0 / bounds.size().max_element().max(f64::MIN_POSITIVE);
+    let mut keyed: Vec<(u32, u32)> = (0..scene.len() as u32)
+        .into_par_iter()
+        .map(|t| {
+            let [a, b, c] = scene.corners(t);
+            (z_order(((a + b + c) / 3.0 - bounds.lo) * cell), t)
+        })
+        .collect();
+    keyed.par_sort_unstable();
+    let triangles: Vec<u32> = keyed.into_iter().map(|(_, t)| t).collect();
+    let bounds: Vec<Aabb> = triangles
+        .par_chunks(BLOCK)
+        .map(|block| block.iter().fold(Aabb::EMPTY, |b, t| b.union(scene.triangle_aabb(*t))))
+        .collect();
+    let cast = |ray: &Ray| {
+        let mut best: Option<Hit> = None;
+        for (block, bounds) in triangles.chunks(BLOCK).zip(&bounds) {
+            if !ray.enters(bounds, best.map_or(f64::INFINITY, |h| h.t)) {
+                continue;
+            }
+            for triangle in block {
+                if let Some(t) = ray.hit(scene.corners(*triangle))
+                    && best.is_none_or(|h| (t, *triangle) < (h.t, h.triangle))
+                {
+                    best = Some(Hit { t, triangle: *triangle });
+                }
+            }
+        }
+        best
+    };
+    rays.par_iter().map(cast).collect()
+}
+
+/// Eight bits of each coordinate, interleaved.
+fn z_order(p: DVec3) -> u32 {
+    let spread = |x: f64| (0..8).fold(0, |s, bit| s | ((x as u32).min(255) >> bit & 1) << (3 * bit));
+    spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2
 }
 
 /// First hits seen from the front, of all first hits on one-sided triangles.
@@ -90,16 +139,15 @@ impl Probe {
 /// Open scenes give 0.7 and more; densely walled ones come near 0.5, so only a
 /// share well below that speaks against the winding.
 pub fn probe_blind(scene: &Scene) -> Probe {
-    let sides = (BUDGET / scene.len().max(1)).min(MAX_RAYS);
-    if sides < MIN_RAYS || scene.two_sided.iter().all(|t| *t) {
+    if scene.len() > MAX_TRIANGLES || scene.two_sided.iter().all(|t| *t) {
         return Probe::default();
     }
     let mut dice = Dice(ChaCha8Rng::seed_from_u64(SEED));
-    let mut rays = Vec::with_capacity(sides);
+    let mut rays = Vec::with_capacity(RAYS);
     // Bounded tries: nearly all triangles may be two-sided.
-    for _ in 0..16 * sides {
+    for _ in 0..16 * RAYS {
         let t = ((dice.unit() * scene.len() as f64) as usize).min(scene.len() - 1);
-        if scene.two_sided[t] || rays.len() + 2 > sides {
+        if scene.two_sided[t] || rays.len() == RAYS {
             continue;
         }
         let [a, b, c] = scene.corners(t as u32);
@@ -125,13 +173,12 @@ pub fn probe_blind(scene: &Scene) -> Probe {
 /// The probe from places known to be free, such as the eyes of a camera path:
 /// well above 0.9 if the winding is right, well below 0.1 if it is inverted.
 pub fn probe_from(scene: &Scene, eyes: &[DVec3]) -> Probe {
-    let count = (BUDGET / scene.len().max(1)).min(MAX_RAYS);
-    if count < MIN_RAYS || eyes.is_empty() {
+    if scene.len() > MAX_TRIANGLES || eyes.is_empty() {
         return Probe::default();
     }
     let mut dice = Dice(ChaCha8Rng::seed_from_u64(SEED));
-    let eye = |i: usize| eyes[i * eyes.len() / count];
-    let rays: Vec<Ray> = (0..count).map(|i| Ray { from: eye(i), direction: dice.direction() }).collect();
+    let eye = |i: usize| eyes[i * eyes.len() / RAYS];
+    let rays: Vec<Ray> = (0..RAYS).map(|i| Ray { from: eye(i), direction: dice.direction() }).collect();
     let mut probe = Probe::default();
     for (ray, hit) in rays.iter().zip(first_hits(scene, &rays)) {
         if let Some(hit) = hit.filter(|h| !scene.two_sided[h.triangle as usize]) {
@@ -142,8 +189,9 @@ pub fn probe_from(scene: &Scene, eyes: &[DVec3]) -> Probe {
     probe
 }
 
-/// A blind share below this contradicts the stated winding: right scenes stay above 0.45.
-const SUSPICIOUS_BLIND: f64 = 0.35;
+/// A blind share below this contradicts the stated winding. Of eleven real scenes the
+/// lowest right one has 0.50 (a closed map); inverted, seven fall below 0.4.
+const SUSPICIOUS_BLIND: f64 = 0.4;
 /// Seen from eyes on a path the question is plain.
 const SUSPICIOUS_FROM_EYES: f64 = 0.5;
 
@@ -161,7 +209,7 @@ pub fn warning_from(scene: &Scene, eyes: &[DVec3], stated: Winding) -> Option<St
 }
 
 fn warning(probe: Probe, limit: f64, stated: Winding) -> Option<String> {
-    let share = probe.share().filter(|s| *s < limit && probe.hits >= MIN_RAYS as u32 / 2)?;
+    let share = probe.share().filter(|s| *s < limit && probe.hits >= MIN_HITS)?;
     let other = match stated {
         Winding::Ccw => "cw",
         Winding::Cw => "ccw",
@@ -247,5 +295,25 @@ mod tests {
         assert_eq!((hit.t, hit.triangle / 12), (4.5, 0));
         let away = Ray { direction: -DVec3::X, ..ray };
         assert_eq!(first_hits(&s, &[away]), [None]);
+    }
+
+    #[test]
+    fn passing_over_blocks_changes_no_hit() {
+        // Rays along the axes through corners and in the planes of faces are the hard ones.
+        let s = cubes(40);
+        let mut dice = Dice(ChaCha8Rng::seed_from_u64(3));
+        let mut rays: Vec<Ray> = Vec::new();
+        for i in 0..300 {
+            let from = (DVec3::new(dice.unit() * 80.0, dice.unit(), dice.unit()) * 4.0).round() * 0.5 - 1.0;
+            let axis = [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Z, DVec3::new(1.0, 0.0, 1.0), dice.direction()];
+            rays.push(Ray { from, direction: axis[i % axis.len()] });
+        }
+        let naive = |ray: &Ray| {
+            let hits = (0..s.len() as u32).filter_map(|t| Some(Hit { t: ray.hit(s.corners(t))?, triangle: t }));
+            hits.reduce(|a, b| if b.t < a.t { b } else { a })
+        };
+        let found = first_hits(&s, &rays);
+        assert_eq!(found, rays.iter().map(naive).collect::<Vec<_>>());
+        assert!(found.iter().flatten().count() > 50, "the comparison is not about misses");
     }
 }

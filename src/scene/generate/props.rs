@@ -43,6 +43,10 @@ pub(super) enum Prop {
     Sleepers,
     Vent,
     Tuft,
+    WindowFrame,
+    DoorFrame,
+    Ladder,
+    Girder,
 }
 
 /// A prop in its place: at the frame's origin, facing its -y, `size` as a factor.
@@ -237,7 +241,7 @@ fn emit(b: &mut Builder, prop: Prop, s: f64, l: usize, rng: &mut Random) {
             b.lathe(&scaled, 6 + 2 * l, (1.0, 1.0));
         }
         Prop::Rock | Prop::SnowRock => {
-            b.paint(if prop == Prop::Rock { "rock_boulder" } else { "rock_snowy" });
+            b.paint(if prop == Prop::Rock { "rock_boulder" } else { "rock_frosted" });
             let r = v3(rng.range(0.8, 1.3), rng.range(0.6, 1.0), rng.range(0.5, 0.9)) * s;
             blob(b, v3(0.0, 0.0, r.z * 0.25), r, 5 + l, 3 + l / 2, 0.28, rng);
         }
@@ -245,7 +249,7 @@ fn emit(b: &mut Builder, prop: Prop, s: f64, l: usize, rng: &mut Random) {
             let h = s * rng.range(0.85, 1.15);
             b.paint("bark_pine");
             b.column(v3(0.0, 0.0, -0.2), 0.05 * h, 0.03 * h, 0.4 * h, 4 + l / 2);
-            b.paint(if prop == Prop::Pine { "pine_needles" } else { "pine_snowy" });
+            b.paint(if prop == Prop::Pine { "pine_needles" } else { "frosted_pine" });
             let tiers = (2 + l / 2).min(6);
             for t in 0..tiers {
                 let z = 0.18 + 0.62 * t as f64 / tiers as f64;
@@ -374,6 +378,64 @@ fn emit(b: &mut Builder, prop: Prop, s: f64, l: usize, rng: &mut Random) {
                         boxed(b, x, -0.03, 0.05 + 1.35 * k as f64 / n, 0.48, 0.06, 0.6 / n);
                     }
                 }
+            }
+        }
+        Prop::WindowFrame => {
+            // Round an opening 1.4 m wide and 1.3 m high in a wall from y = 0 to 0.3.
+            b.paint("white_window_frame");
+            boxed(b, 0.0, 0.08, -0.1, 1.8, 0.5, 0.12);
+            if l >= 1 {
+                boxed(b, 0.0, 0.15, 1.26, 1.7, 0.42, 0.1);
+                for x in [-0.72, 0.72] {
+                    boxed(b, x, 0.15, 0.0, 0.12, 0.4, 1.28);
+                }
+            }
+            if l >= 3 {
+                b.paint("paint_window_shutter");
+                for x in [-1.1, 1.1] {
+                    boxed(b, x, -0.04, -0.02, 0.6, 0.06, 1.34);
+                    for k in 0..(l - 2).min(7) {
+                        let n = (l - 2).min(7) as f64;
+                        boxed(b, x, -0.07, 0.08 + 1.2 * k as f64 / n, 0.5, 0.05, 0.7 / n);
+                    }
+                }
+            }
+        }
+        Prop::DoorFrame => {
+            // Round an opening 1.8 m wide and 2.4 m high in a wall from y = 0 to 0.3.
+            b.paint("trim_door");
+            boxed(b, 0.0, 0.15, 2.36, 2.3, 0.46, 0.2);
+            for x in if l >= 1 { &[-0.95, 0.95][..] } else { &[][..] } {
+                boxed(b, *x, 0.15, sunk, 0.2, 0.44, 2.39);
+            }
+            if l >= 2 {
+                b.paint("lamp_door");
+                b.within(Frame::at(v3(0.0, -0.16, 2.75)), |b| {
+                    b.lathe(&[(0.0, -0.12), (0.12, 0.0), (0.0, 0.14)], 3 + l, (1.0, 1.0))
+                });
+            }
+        }
+        Prop::Ladder => {
+            b.paint("metal_ladder");
+            for x in [-0.25, 0.25] {
+                b.block_on(v3(x, 0.0, sunk), v3(0.06, 0.06, s));
+            }
+            let rungs = (2 + 3 * l).min((s * 3.0) as usize);
+            for k in 0..rungs {
+                b.block_on(v3(0.0, 0.0, s * (k as f64 + 0.5) / rungs as f64), v3(0.5, 0.04, 0.04));
+            }
+        }
+        Prop::Girder => {
+            // A lattice beam along x, `size` metres long, hanging below the frame's origin.
+            b.paint("metal_girder");
+            for z in [-0.06, -0.66] {
+                b.beam(v3(-s * 0.5, 0.0, z), v3(s * 0.5, 0.0, z), 0.14, 0.12);
+            }
+            let bays = (2 + 2 * l).min((s * 1.2) as usize).max(2);
+            for k in 0..bays {
+                let x = |k: usize| s * (k as f64 / bays as f64 - 0.5);
+                let (z0, z1) = if k % 2 == 0 { (-0.66, -0.06) } else { (-0.06, -0.66) };
+                b.beam(v3(x(k), 0.0, z0), v3(x(k + 1), 0.0, z1), 0.08, 0.08);
             }
         }
         Prop::Canopy => {

@@ -94,7 +94,7 @@ impl Builder {
     /// A simple polygon (counter-clockwise in its section) drawn out from `w0` to `w1`.
     pub fn extrude(&mut self, along: Along, section: &[DVec2], w0: f64, w1: f64) {
         let flip = along.mirrored();
-        let mut put = |b: &mut Builder, p: [(DVec2, f64); 3]| {
+        let put = |b: &mut Builder, p: [(DVec2, f64); 3]| {
             let [a, c, d] = p.map(|(s, w)| along.point(s.x, s.y, w));
             if flip { b.tri(a, d, c) } else { b.tri(a, c, d) }
         };

@@ -143,7 +143,7 @@ fn drawing_leaves_by_plane_side_is_a_painters_order() {
         let eye = DVec3::new(angle.cos(), angle.sin(), (f64::from(k) * 0.7).sin()) * f64::from(k % 5) * 4.0;
         let order = front_to_back(&h, eye);
         assert_eq!(order.len() as u64, h.stats.leaves);
-        for j in 0..15 {
+        for j in 0..40 {
             let a = f64::from(j) * 1.7 + angle;
             let ray = DVec3::new(a.cos(), a.sin(), (f64::from(j) * 0.9).cos() * 0.8).normalize();
             let mut hits: Vec<(f64, usize)> = Vec::new();
@@ -157,7 +157,7 @@ fn drawing_leaves_by_plane_side_is_a_painters_order() {
             }
         }
     }
-    assert!(crossings > 1000, "the rays cross many leaves: {crossings}");
+    assert!(crossings > 500, "the rays cross many leaves: {crossings}");
 }
 
 #[test]
@@ -171,9 +171,9 @@ fn wide_and_binary_layouts_hold_the_same_pieces_in_the_same_order() {
 
 #[test]
 fn a_tree_that_splits_without_end_says_which_parameter_to_change() {
-    // Large triangles that all pass through each other.
-    let scene = soup(23, 3000, 1.0, 9.0);
-    let (s, _) = structure::make(&Spec::parse("bsp:min_leaf=10,split_weight=0").unwrap()).unwrap();
+    // Large triangles that pass through each other.
+    let scene = soup(2, 400, 10.0, 8.0);
+    let (s, _) = structure::make(&Spec::parse("bsp:min_leaf=20").unwrap()).unwrap();
     let e = s.build(&scene).err().expect("thousands of mutual intersections");
     assert_eq!(e.key.as_deref(), Some("split_weight"));
     assert!(e.to_string().contains("min_leaf") && e.message.contains("4 pieces a triangle"), "{e}");
