@@ -128,7 +128,8 @@ pub fn render(scene: &Scene, view: &View, width: u32, height: u32, style: &Style
         let hollow = |a: f64, b: f64| {
             let rise = (a + b) * 0.5 - q;
             let relative = if view.is_perspective() { rise / q.max(1e-9) * 12.0 } else { rise };
-            if relative.is_finite() { relative.clamp(0.0, 1.0) } else { 0.0 }
+            // Much nearer neighbours are another thing in front, not a corner.
+            if !relative.is_finite() || relative <= 0.0 { 0.0 } else { relative.min(0.25 / relative).min(0.5) * 2.0 }
         };
         let across = hollow(at(x - reach, y), at(x + reach, y));
         let along = hollow(at(x, y - reach), at(x, y + reach));
