@@ -5,7 +5,7 @@
 //! `block * 8 + lane`. The entries (triangles, or fragments of triangles) of a
 //! subtree are contiguous positions, so "wholly inside" is one range.
 
-use crate::math::{Box32, DVec3};
+use crate::math::{Aabb, Box32, DVec3};
 use crate::scene::Scene;
 use glam::Vec3;
 
@@ -166,6 +166,7 @@ impl Hierarchy {
         self.entries.iter().for_each(|t| seen[*t as usize] = true);
         assert!(seen.iter().all(|s| *s), "every triangle has an entry");
         let mut reached = vec![false; blocks];
+        let mut held = vec![Box32::EMPTY; scene.len()];
         let mut covered = 0;
         for root in 0..self.root_blocks {
             assert_eq!(self.parent[root as usize], NONE, "roots have no parent");
@@ -174,10 +175,15 @@ impl Hierarchy {
                 assert_eq!(links.first[lane], covered, "roots tile the entries in order");
                 covered = links.end[lane];
             }
-            self.check_block(scene, root, &mut reached);
+            self.check_block(scene, root, &mut reached, &mut held);
         }
         assert_eq!(covered as usize, self.entries.len(), "roots cover every entry");
         assert!(reached.iter().all(|r| *r), "every block is reached exactly once");
+        if self.fragments.is_none() {
+            for (t, held) in held.iter().enumerate() {
+                assert!(held.contains_box(&scene.triangle_box(t as u32)), "the copies of triangle {t} reach all of it");
+            }
+        }
     }
 
     fn lanes(&self, block: u32) -> impl Iterator<Item = usize> + use<> {
@@ -185,7 +191,7 @@ impl Hierarchy {
         (0..LANES).filter(move |l| live >> l & 1 == 1)
     }
 
-    fn check_block(&self, scene: &Scene, block: u32, reached: &mut [bool]) {
+    fn check_block(&self, scene: &Scene, block: u32, reached: &mut [bool], held: &mut [Box32]) {
         let mut pending = vec![block];
         while let Some(block) = pending.pop() {
             assert!(!std::mem::replace(&mut reached[block as usize], true), "block {block} is reached twice");
@@ -196,11 +202,14 @@ impl Hierarchy {
                 let (first, own_end, end) = (links.first[lane], links.own_end[lane], links.end[lane]);
                 assert!(first <= own_end && own_end <= end && first < end, "node {block}:{lane} has a proper range");
                 for position in first..own_end {
-                    let b = crate::math::Aabb::of_points(&self.piece(scene, position));
-                    assert!(
-                        bounds.contains_box(&b.relative_to(self.origin)) || self.is_clipped(),
-                        "bounds hold the own entries"
-                    );
+                    let piece = Aabb::of_points(&self.piece(scene, position)).relative_to(self.origin);
+                    // One of several copies may reach out of its node: the node
+                    // answers for the part inside its box.
+                    let clip = Box32 { lo: piece.lo.max(bounds.lo), hi: piece.hi.min(bounds.hi) };
+                    assert!(!clip.is_empty(), "an entry touches its node");
+                    assert!(self.fragments.is_none() || clip == piece, "bounds hold the own fragments");
+                    let held = &mut held[self.entries[position as usize] as usize];
+                    *held = held.union(clip);
                 }
                 let child = links.child[lane];
                 if child == NONE {
@@ -222,14 +231,5 @@ impl Hierarchy {
                 pending.push(child);
             }
         }
-    }
-
-    /// Replicated triangles may reach out of the node that holds one of their copies.
-    fn is_clipped(&self) -> bool {
-        self.fragments.is_none() && self.entries.len() > self.stats_unique()
-    }
-
-    fn stats_unique(&self) -> usize {
-        self.entries.iter().copied().max().map_or(0, |m| m as usize + 1)
     }
 }

@@ -30,6 +30,8 @@ pub mod stats;
 pub mod structure;
 
 #[cfg(feature = "service")]
+pub mod claim;
+#[cfg(feature = "service")]
 pub mod cli;
 #[cfg(feature = "service")]
 pub mod manifest;

@@ -251,7 +251,8 @@ impl Param {
             (Default::Float { min, max, .. }, _) => wrong(format!("a number from {min} to {max}")),
             (Default::Bool(_), Value::Bool(_)) => Ok(value.clone()),
             (Default::Bool(_), _) => wrong("true or false".to_string()),
-            (Default::Choice(c), Value::Text(s)) if c.contains(&s.as_str()) => Ok(value.clone()),
+            // By its printed form, so that a choice may be a number: `sectors=8`.
+            (Default::Choice(c), _) if c.contains(&value.to_string().as_str()) => Ok(Value::Text(value.to_string())),
             (Default::Choice(c), _) => {
                 let list = c.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
                 let near = did_you_mean(&value.to_string(), c.iter().copied());

@@ -1,1 +1,181 @@
-//! Medians, spreads and intervals.
+//! Medians, spreads and intervals. The unit that is resampled is the trial (one
+//! child process), never the frame: frames of one walk are autocorrelated, so
+//! an interval over them would be far too narrow (ALGORITHMS G4).
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{RngCore, SeedableRng};
+
+/// Resamples of every bootstrap in reports.
+pub const RESAMPLES: usize = 10_000;
+
+/// Sorted copy without NaN.
+fn sorted(values: &[f64]) -> Vec<f64> {
+    let mut v: Vec<f64> = values.iter().copied().filter(|x| !x.is_nan()).collect();
+    v.sort_unstable_by(f64::total_cmp);
+    v
+}
+
+/// Quantile `q` in 0..=1 by linear interpolation between order statistics
+/// (type 7 of Hyndman and Fan 1996); NaN for no values.
+pub fn quantile(values: &[f64], q: f64) -> f64 {
+    quantile_sorted(&sorted(values), q)
+}
+
+fn quantile_sorted(v: &[f64], q: f64) -> f64 {
+    if v.is_empty() {
+        return f64::NAN;
+    }
+    let at = q.clamp(0.0, 1.0) * (v.len() - 1) as f64;
+    let (low, high) = (v[at.floor() as usize], v[at.ceil() as usize]);
+    // Equal neighbours first: infinity minus infinity would be NaN.
+    if low == high { low } else { low + (high - low) * at.fract() }
+}
+
+pub fn median(values: &[f64]) -> f64 {
+    quantile(values, 0.5)
+}
+
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Median absolute deviation from the median, not scaled.
+pub fn mad(values: &[f64]) -> f64 {
+    let m = median(values);
+    median(&values.iter().map(|x| (x - m).abs()).collect::<Vec<_>>())
+}
+
+/// Standard deviation over mean; NaN for fewer than two values.
+pub fn coefficient_of_variation(values: &[f64]) -> f64 {
+    let m = mean(values);
+    let squares: f64 = values.iter().map(|x| (x - m).powi(2)).sum();
+    (squares / (values.len() as f64 - 1.0)).sqrt() / m
+}
+
+/// Uniform index below `n`, by multiplication (bias below 2^-32 for our sizes).
+fn below(rng: &mut ChaCha8Rng, n: usize) -> usize {
+    ((u64::from(rng.next_u32()) * n as u64) >> 32) as usize
+}
+
+/// 95 % percentile-bootstrap interval of `statistic` over resampled trials.
+/// One value gives itself twice: no spread is known, and none is invented.
+pub fn bootstrap_ci(values: &[f64], resamples: usize, seed: u64, statistic: impl Fn(&[f64]) -> f64) -> (f64, f64) {
+    if values.len() < 2 {
+        let v = values.first().copied().unwrap_or(f64::NAN);
+        return (v, v);
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut sample = vec![0.0; values.len()];
+    let found: Vec<f64> = (0..resamples)
+        .map(|_| {
+            sample.iter_mut().for_each(|s| *s = values[below(&mut rng, values.len())]);
+            statistic(&sample)
+        })
+        .collect();
+    let v = sorted(&found);
+    (quantile_sorted(&v, 0.025), quantile_sorted(&v, 0.975))
+}
+
+/// 95 % interval of the median over trials.
+pub fn bootstrap_ci_median(values: &[f64], resamples: usize, seed: u64) -> (f64, f64) {
+    bootstrap_ci(values, resamples, seed, median)
+}
+
+/// Ratio of medians `a / b` with its 95 % interval; trials of `a` and `b` are
+/// resampled independently, since they ran in different processes.
+pub fn ratio_ci(a: &[f64], b: &[f64], resamples: usize, seed: u64) -> (f64, f64, f64) {
+    let ratio = median(a) / median(b);
+    if a.is_empty() || b.is_empty() || (a.len() < 2 && b.len() < 2) {
+        return (ratio, ratio, ratio);
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut draw = |from: &[f64]| -> f64 {
+        let sample: Vec<f64> = from.iter().map(|_| from[below(&mut rng, from.len())]).collect();
+        median(&sample)
+    };
+    let found: Vec<f64> = (0..resamples).map(|_| draw(a) / draw(b)).collect();
+    let v = sorted(&found);
+    (ratio, quantile_sorted(&v, 0.025), quantile_sorted(&v, 0.975))
+}
+
+/// Pearson correlation; NaN when either side does not vary.
+pub fn pearson(x: &[f64], y: &[f64]) -> f64 {
+    let (mx, my) = (mean(x), mean(y));
+    let (mut xy, mut xx, mut yy) = (0.0, 0.0, 0.0);
+    for (a, b) in x.iter().zip(y) {
+        xy += (a - mx) * (b - my);
+        xx += (a - mx).powi(2);
+        yy += (b - my).powi(2);
+    }
+    xy / (xx * yy).sqrt()
+}
+
+/// Spearman rank correlation, ties given their mean rank.
+pub fn spearman(x: &[f64], y: &[f64]) -> f64 {
+    pearson(&ranks(x), &ranks(y))
+}
+
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    let mut out = vec![0.0; values.len()];
+    let mut start = 0;
+    while start < order.len() {
+        let mut end = start + 1;
+        while end < order.len() && values[order[end]] == values[order[start]] {
+            end += 1;
+        }
+        let rank = (start + end - 1) as f64 / 2.0;
+        order[start..end].iter().for_each(|i| out[*i] = rank);
+        start = end;
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_interpolate_and_survive_infinities() {
+        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&[1.0, 2.0, 3.0, 4.0]), 2.5);
+        assert_eq!(quantile(&[0.0, 10.0], 0.99), 9.9);
+        assert_eq!(median(&[f64::INFINITY, f64::INFINITY]), f64::INFINITY);
+        assert!(median(&[]).is_nan());
+        assert_eq!(mad(&[1.0, 1.0, 2.0, 2.0, 4.0, 6.0, 9.0]), 1.0);
+    }
+
+    #[test]
+    fn the_interval_covers_the_true_median_about_as_often_as_it_says() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let uniform = |rng: &mut ChaCha8Rng| f64::from(rng.next_u32()) / f64::from(u32::MAX);
+        let covered = (0..200)
+            .filter(|i| {
+                let values: Vec<f64> = (0..25).map(|_| uniform(&mut rng)).collect();
+                let (lo, hi) = bootstrap_ci_median(&values, 500, *i);
+                lo <= 0.5 && 0.5 <= hi
+            })
+            .count();
+        assert!((175..=200).contains(&covered), "{covered} of 200");
+    }
+
+    #[test]
+    fn a_ratio_of_equal_samples_straddles_one() {
+        let a = [1.0, 1.1, 0.9, 1.05, 0.95];
+        let (r, lo, hi) = ratio_ci(&a, &a, 2000, 7);
+        assert!(r == 1.0 && lo < 1.0 && hi > 1.0);
+        let twice = a.map(|x| 2.0 * x);
+        let (r, lo, _) = ratio_ci(&twice, &a, 2000, 7);
+        assert!(r == 2.0 && lo > 1.5);
+    }
+
+    #[test]
+    fn correlations_of_a_monotone_curve() {
+        let x: Vec<f64> = (0..50).map(f64::from).collect();
+        let y: Vec<f64> = x.iter().map(|v| v * v * v).collect();
+        assert!((spearman(&x, &y) - 1.0).abs() < 1e-12);
+        assert!(pearson(&x, &y) < 0.95);
+        assert_eq!(ranks(&[5.0, 5.0, 1.0]), [1.5, 1.5, 0.0]);
+    }
+}

@@ -2,10 +2,18 @@
 //! temporal state. The manifest composes them; neither knows any structure.
 
 pub mod depth_first;
+mod descent;
 pub mod flat;
 pub mod frustum;
+pub mod frustum_planes;
+pub mod frustum_scalar;
+pub mod frustum_volume;
+#[cfg(target_arch = "x86_64")]
+pub mod frustum_x86;
 pub mod normal_mask;
 pub mod octant_mask;
+#[cfg(target_arch = "x86_64")]
+mod prefetch_x86;
 
 use crate::error::Result;
 use crate::hierarchy::Hierarchy;
@@ -66,23 +74,37 @@ pub trait Test: Send {
     fn removes(&self) -> Removes;
     /// Builds the per-node columns; returns their bytes. Timed as part of building.
     fn prepare(&mut self, scene: &Scene, hierarchy: &Hierarchy) -> usize;
+    /// Forgets what was learnt in earlier frames, so that every pass over a path
+    /// does the same work.
+    fn reset(&mut self) {}
     /// Once a frame, before any judgement.
     fn begin(&mut self, view: &View, hierarchy: &Hierarchy);
     /// Carry of the roots; not 0 unless this frame nothing can be culled.
     fn initial_carry(&self) -> u8;
-    /// Judges the `live` lanes of `block`. `carry` is what the parent got
+    /// Judges the `live` lanes of `block` and counts its own work (`lane_tests` and
+    /// what it compares) in `tally`. `carry` is what the parent got
     /// (never 0: the walk does not ask then).
     fn judge(&mut self, hierarchy: &Hierarchy, block: u32, live: u8, carry: u8, tally: &mut Tally) -> Verdict;
     /// Judges the root blocks one after another without a hierarchy below them:
-    /// ORs the outside lanes of block `b` into `outside[b]`. A test with a wide
-    /// kernel overrides it.
+    /// ORs the outside lanes of block `b` into `outside[b]`; lanes that are not
+    /// live may come back set. A test with a wide kernel overrides it.
     fn judge_flat(&mut self, hierarchy: &Hierarchy, outside: &mut [u8], tally: &mut Tally) {
-        let carry = self.initial_carry();
-        for (block, out) in outside.iter_mut().enumerate() {
-            let live = hierarchy.links[block].live & !*out;
-            if live != 0 {
-                *out |= self.judge(hierarchy, block as u32, live, carry, tally).outside & live;
-            }
+        judge_flat_by_block(self, hierarchy, outside, tally);
+    }
+}
+
+/// [`Test::judge_flat`] by way of [`Test::judge`].
+pub fn judge_flat_by_block<T: Test + ?Sized>(
+    test: &mut T,
+    hierarchy: &Hierarchy,
+    outside: &mut [u8],
+    tally: &mut Tally,
+) {
+    let carry = test.initial_carry();
+    for (block, out) in outside.iter_mut().enumerate() {
+        let live = hierarchy.links[block].live & !*out;
+        if live != 0 {
+            *out |= test.judge(hierarchy, block as u32, live, carry, tally).outside & live;
         }
     }
 }
@@ -91,6 +113,8 @@ pub trait Test: Send {
 pub trait Walk: Send {
     /// A reason why this walk cannot run on `hierarchy`, if it cannot.
     fn refuses(&self, hierarchy: &Hierarchy) -> Option<String>;
+    /// Forgets earlier frames, as [`Test::reset`].
+    fn reset(&mut self) {}
     /// Appends what to draw for this frame. `tests` have begun the frame.
     fn run(
         &mut self,

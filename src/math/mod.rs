@@ -2,6 +2,7 @@
 
 pub mod aabb;
 pub mod camera;
+pub mod exact;
 pub mod predicates;
 
 pub use aabb::{Aabb, Box32};

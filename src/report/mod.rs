@@ -1,1 +1,102 @@
-//! report
+//! From the results of a study to charts, tables and one page.
+//!
+//! ```text
+//! StudyResults -> Grid (places x combinations) -> Figure -> SVG, PNG
+//!                                              -> Table  -> HTML, CSV, Markdown, LaTeX
+//!              -> verdicts, findings           -> index.html
+//! ```
+//! Same results, same bytes: nothing here reads a clock, and every bootstrap has a stated seed.
+
+pub mod charts;
+pub mod claims;
+pub mod compare;
+pub mod consolidate;
+pub mod curves;
+pub mod facets;
+pub mod figure;
+pub mod filter;
+pub mod findings;
+pub mod font;
+pub mod forest;
+pub mod format;
+pub mod labels;
+pub mod metrics;
+pub mod page;
+pub mod pareto;
+pub mod query;
+pub mod render;
+pub mod rows;
+pub mod scale;
+pub mod scatter;
+pub mod style;
+pub mod table;
+pub mod tables;
+
+use crate::claim::Claim;
+use crate::error::{Error, Result};
+use crate::results::StudyResults;
+use std::path::{Path, PathBuf};
+
+/// What [`write`] wrote.
+#[derive(Debug)]
+pub struct Files {
+    pub page: PathBuf,
+    pub charts: Vec<PathBuf>,
+    pub tables: Vec<PathBuf>,
+}
+
+/// Writes `index.html`, `charts/*.{svg,png}` and `tables/*.{csv,md,tex}` below `out_dir`.
+///
+/// # Errors
+/// When a file cannot be written; names it.
+pub fn write(results: &StudyResults, claims: &[Claim], out_dir: &Path) -> Result<Files> {
+    let grid = labels::Grid::of(results);
+    let judged = claims::judge_all(results, claims);
+    let figures = charts::all(&grid, &judged);
+    let tables = vec![
+        tables::times(&grid),
+        tables::memory(&grid),
+        tables::build(&grid),
+        tables::errors(&grid),
+        tables::problems(results),
+        tables::excluded(results),
+        tables::claims(&judged),
+        tables::environments(results),
+    ];
+    let mut files = Files { page: out_dir.join("index.html"), charts: Vec::new(), tables: Vec::new() };
+    let mut inline = Vec::new();
+    for figure in &figures {
+        let base = out_dir.join("charts");
+        files.charts.push(save(&base.join(format!("{}.svg", figure.id)), render::svg(figure, true)?.as_bytes())?);
+        files.charts.push(save(&base.join(format!("{}.png", figure.id)), &render::png(figure)?)?);
+        inline.push(render::svg(figure, false)?);
+    }
+    for table in tables.iter().filter(|t| !t.rows.is_empty()) {
+        let base = out_dir.join("tables");
+        for (suffix, text) in [("csv", table.csv()), ("md", table.markdown()), ("tex", table.latex())] {
+            files.tables.push(save(&base.join(format!("{}.{suffix}", table.id)), text.as_bytes())?);
+        }
+    }
+    let page = page::document(&page::Content {
+        grid: &grid,
+        judged: &judged,
+        figures: &figures,
+        svgs: &inline,
+        tables: &tables,
+    });
+    save(&files.page, page.as_bytes())?;
+    Ok(files)
+}
+
+fn save(path: &Path, bytes: &[u8]) -> Result<PathBuf> {
+    let write = || -> std::io::Result<()> {
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder)?;
+        }
+        std::fs::write(path, bytes)
+    };
+    write().map_err(|e| {
+        Error::io(path, "cannot write the report", &e).help("choose another folder with --out, or free some space")
+    })?;
+    Ok(path.to_path_buf())
+}

@@ -1,13 +1,17 @@
 //! Scenes: triangles in f64 metres with what every method needs to know of them,
 //! and how they come to be (files, generators) or are walked through (camera paths).
 
+pub mod cache;
 pub mod generate;
 pub mod gltf;
 pub mod load;
+pub mod mtl;
 pub mod obj;
+pub mod placement;
 pub mod sanitise;
 pub mod walkthrough;
 pub mod winding;
+pub mod write;
 
 use crate::math::{Aabb, Box32, DVec3};
 use serde::{Deserialize, Serialize};
@@ -50,7 +54,8 @@ pub struct LoadReport {
     /// glTF points and lines: counted and left out.
     pub points_and_lines: u64,
     pub vertices_welded: u64,
-    /// Share of first hits of random rays seen from the front, where probed.
+    /// Share of first hits of random rays seen from the front, where probed
+    /// ([`winding::probe_blind`]).
     pub front_hit_share: Option<f64>,
     /// Sentences for the user.
     pub warnings: Vec<String>,

@@ -2,6 +2,7 @@
 //! Adding one is its file and its line in [`ALL`].
 
 pub mod bsp;
+pub mod builder;
 pub mod list;
 pub mod octree;
 

@@ -1,1 +1,10 @@
-//! Tests: culling.
+//! Culling tests and walks: facts B2-B5, C1, C3 and C4 of the algorithm notes, and
+//! the agreement of all kernels, accelerations and walks.
+
+mod build;
+mod facing;
+mod frustum;
+mod kernels;
+mod masks;
+mod numbers;
+mod walks;

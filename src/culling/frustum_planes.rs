@@ -1,0 +1,148 @@
+//! The planes of a frame as the frustum kernels read them, and the proof that
+//! their guard covers every rounding.
+//!
+//! # Arithmetic
+//! Let `u = 2^-24`, `c` a bound (f32 offset from the scene origin, exact), and
+//! `e = eye - origin` (real). `e` is split once a frame into `h = f32(e)` and the
+//! rest `l = e - h`, which is known in f64 to its last bits (two-sum). Then
+//! `n.(c - e) + d = n.(c - h) + d'` with `d' = d - n.l`, so the rest costs
+//! nothing per box: it moves into the offset. A kernel evaluates
+//!
+//! ```text
+//! a_i = c_i - h_i          one rounding:      |error| <= u |a_i|
+//! n^  = f32(n)             one rounding:      |error| <= u |n_i| + 2^-150
+//! s   = ((n^x ax + n^y ay) + n^z az) + D      gamma_4 on x and y, gamma_3 on z, gamma_1 on D
+//! g   = 4u sum_i (|lo_i + hi_i| + |hi_i - lo_i|)  = 8u A,  A = sum_i max(|lo_i|, |hi_i|)
+//! ```
+//! (in `g`, `lo` and `hi` are relative). As `|n_i| <= 1`, the error of `s` from
+//! the coordinates, the normal and the sum is at most `(1 + 1 + 4) u A (1 + O(u))`,
+//! six of the eight `u A` in `g`, which its own five roundings cannot use up.
+//! The rounding that the last addition makes on account of `D`, the f64 errors of
+//! `d'` and underflow are in [`FramePlanes::d_out`] and `d_in`, which are `d'`
+//! moved outward and rounded in that direction. Therefore
+//!
+//! - `s(p-vertex) < -g` proves that the box is outside the plane,
+//! - `s(n-vertex) >  g` proves that it is inside.
+//!
+//! The sum of magnitudes in `g` (rather than a maximum) is NaN when any of the six
+//! bounds is NaN and infinite when one is infinite, and both comparisons are then
+//! false for every plane: such a box is kept (fact B5.4).
+//!
+//! No fused multiply-add and one order of association: scalar, AVX2 and AVX-512
+//! give the same bits.
+
+use crate::math::{DVec3, View};
+
+/// left, right, bottom, top, near, far.
+pub const MAX_PLANES: usize = 6;
+
+/// Guard on each axis: half of 8u, as `|lo + hi| + |hi - lo|` is twice the maximum.
+pub const GUARD: f32 = 4.0 / (1u32 << 24) as f32;
+
+/// One plane in f32, camera-relative, with the corner choice that the sign of its
+/// normal fixes for the frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Plane32 {
+    pub normal: [f32; 3],
+    /// Offset moved up by every error it has to answer for.
+    pub d_out: f32,
+    /// Offset moved down likewise.
+    pub d_in: f32,
+    /// Which of `lo x, lo y, lo z, hi x, hi y, hi z` is the p-vertex, per axis.
+    pub p: [usize; 3],
+    /// Which is the n-vertex.
+    pub n: [usize; 3],
+}
+
+/// All planes of a frame.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FramePlanes {
+    /// The eye relative to the origin, rounded: what bounds are made relative to.
+    pub eye: [f32; 3],
+    /// 5, or 6 with a far plane; the rest of `planes` is unused.
+    pub count: usize,
+    pub planes: [Plane32; MAX_PLANES],
+}
+
+impl FramePlanes {
+    pub fn new(view: &View, origin: DVec3) -> FramePlanes {
+        let mut frame = FramePlanes { count: view.planes.len(), ..Default::default() };
+        let mut rest = DVec3::ZERO;
+        for axis in 0..3 {
+            let (e, error) = two_diff(view.eye[axis], origin[axis]);
+            frame.eye[axis] = e as f32;
+            // Exact: both have at most 53 bits and the difference fewer.
+            rest[axis] = (e - f64::from(frame.eye[axis])) + error;
+        }
+        for (out, plane) in frame.planes.iter_mut().zip(&view.planes) {
+            let d = plane.offset_m - plane.normal.dot(rest);
+            // 2u for the last addition, 2^-48 for f64, 2^-120 for underflow.
+            let slack = d.abs() * (-22f64).exp2()
+                + (plane.offset_m.abs() + rest.abs().element_sum()) * (-48f64).exp2()
+                + (-120f64).exp2();
+            out.d_out = up(d + slack);
+            out.d_in = down(d - slack);
+            for axis in 0..3 {
+                let n = plane.normal[axis] as f32;
+                out.normal[axis] = n;
+                (out.p[axis], out.n[axis]) = if n >= 0.0 { (axis + 3, axis) } else { (axis, axis + 3) };
+            }
+        }
+        frame
+    }
+
+    /// Bit per plane.
+    pub fn all(&self) -> u8 {
+        ((1u16 << self.count) - 1) as u8
+    }
+}
+
+/// `a - b` and its rounding error (Knuth).
+fn two_diff(a: f64, b: f64) -> (f64, f64) {
+    let d = a - b;
+    let b_virtual = a - d;
+    let a_virtual = d + b_virtual;
+    (d, (a - a_virtual) + (b_virtual - b))
+}
+
+fn up(x: f64) -> f32 {
+    let r = x as f32;
+    if f64::from(r) < x { r.next_up() } else { r }
+}
+
+fn down(x: f64) -> f32 {
+    -up(-x)
+}
+
+/// What the planes say of 8 boxes: bit per lane, an entry a plane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PlaneMasks {
+    pub outside: [u8; MAX_PLANES],
+    pub inside: [u8; MAX_PLANES],
+}
+
+/// What a flat kernel did: lanes judged, and plane tests if each lane stops at
+/// the first plane that rejects it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Work {
+    pub lanes: u64,
+    pub planes: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Camera, Pose};
+
+    #[test]
+    fn the_rounded_offsets_enclose_the_exact_one() {
+        for x in [0.0, 1.0, -1.0, 0.1, 1e-30, 1e30, 1e300, -1e300] {
+            assert!(f64::from(down(x)) <= x && x <= f64::from(up(x)), "{x}");
+        }
+        let pose = Pose { eye: DVec3::new(1e6 + 0.3, -7.7e5, 12.1), forward: DVec3::X, up: DVec3::Z };
+        let camera = Camera { far_m: Some(1e3), ..Default::default() };
+        let frame = FramePlanes::new(&View::new(&camera, &pose), DVec3::new(10.0, 20.0, 30.0));
+        assert_eq!((frame.count, frame.all()), (6, 0b11_1111));
+        assert!(frame.planes.iter().all(|p| p.d_in < p.d_out && p.d_out - p.d_in < 1e-3));
+    }
+}

@@ -1,0 +1,171 @@
+//! `[[claim]]`: published statements, checked as far as names go.
+
+use super::axes::{axis, axis_names, unknown_axis};
+use super::fields::Fields;
+use super::rules::Rule;
+use super::scenes::{Names, unknown_name};
+use super::selections;
+use super::tree::{Data, Node};
+use crate::claim::{Claim, METRICS, Relation, Selection};
+use crate::error::{Error, did_you_mean};
+use std::collections::BTreeMap;
+
+pub fn read(top: &mut Fields, names: &Names) -> Vec<Rule<Claim>> {
+    let mut out: Vec<Rule<Claim>> = Vec::new();
+    let mut ids: Vec<String> = Vec::new();
+    for mut f in top.tables("claim") {
+        let id = f.name("id", "give it an id, such as id = \"A4.3\"");
+        if let Some(id) = &id {
+            if ids.contains(id)
+                && let Some(node) = f.get("id")
+            {
+                let e = Error::new(format!("`{id}` names two claims"));
+                f.note(&node.place, "id", e.help(format!("rename one, such as \"{id}_2\"")));
+            }
+            ids.push(id.clone());
+        }
+        let (key, place) = (f.path.clone(), f.place.clone());
+        if let Some(value) = claim(f, id, names) {
+            out.push(Rule { value, key, place });
+        }
+    }
+    out
+}
+
+fn claim(mut f: Fields, id: Option<String>, names: &Names) -> Option<Claim> {
+    let text = f.sentence("text", "quote or restate what the source says");
+    let source = f.sentence("source", "name paper and figure, such as \"Serpa & Rodrigues 2014, fig. 3\"");
+    let metric = metric(&mut f);
+    let numerator = selection(&mut f, "numerator", names);
+    let denominator = selection(&mut f, "denominator", names);
+    if !f.has("relation") {
+        f.missing("relation", "what is stated of numerator / denominator: \"<\", \">\", \"ratio\" or \"grows\"");
+    }
+    let relation = f.choice("relation", Relation::ALL);
+    let for_each = for_each(&mut f);
+    let (published, published_for) = published(&mut f, for_each.as_deref(), names);
+    let tolerance = f.number("tolerance", "a share from 0 to 10, such as 0.25", |x| (0.0..=10.0).contains(&x));
+    let nothing_published = published.is_none() && published_for.is_empty();
+    if relation == Some(Relation::Ratio) && nothing_published && !f.has("published") {
+        f.missing(
+            "published",
+            "relation = \"ratio\" needs the published ratio: 3.35, [1.71, 1.79] or { nucleus = 3.5 }",
+        );
+    }
+    if relation == Some(Relation::Grows)
+        && for_each.as_deref() != Some("scene")
+        && let Some(node) = f.get("relation")
+    {
+        let e = Error::new("\"grows\" compares scenes by their triangle count");
+        f.note(&node.place, "relation", e.help("add for_each = \"scene\""));
+    }
+    f.finish();
+    Some(Claim {
+        id: id?,
+        text: text?,
+        source: source?,
+        metric: metric?,
+        numerator: numerator?,
+        denominator: denominator?,
+        relation: relation?,
+        published,
+        published_for,
+        tolerance: tolerance.unwrap_or(0.25),
+        for_each,
+    })
+}
+
+fn metric(f: &mut Fields) -> Option<String> {
+    let text = f.sentence("metric", "what is compared, such as metric = \"total_cull_ms\"")?;
+    if METRICS.iter().any(|m| m.name == text) {
+        return Some(text);
+    }
+    let names = METRICS.iter().map(|m| m.name);
+    let mut e = Error::new(format!("unknown metric `{text}`"));
+    e.help = Some(match did_you_mean(&text, names.clone()) {
+        Some(near) => format!("did you mean \"{near}\"?"),
+        None => format!("known: {}", names.collect::<Vec<_>>().join(", ")),
+    });
+    let place = f.get("metric")?.place.clone();
+    f.note(&place, "metric", e);
+    None
+}
+
+fn selection(f: &mut Fields, name: &'static str, names: &Names) -> Option<Selection> {
+    if !f.has(name) {
+        f.known(name);
+        f.missing(name, format!("select runs, such as {name} = {{ structure = \"octree\", culling = \"frustum\" }}"));
+        return None;
+    }
+    let key = f.key(name);
+    let node = f.get(name)?;
+    selections::read(f.mistakes, &key, node, names)
+}
+
+fn for_each(f: &mut Fields) -> Option<String> {
+    let text = f.text("for_each")?;
+    if axis_names().any(|a| a == text) {
+        return Some(text.to_string());
+    }
+    let place = f.get("for_each")?.place.clone();
+    f.note(&place, "for_each", unknown_axis(text));
+    None
+}
+
+type Published = (Option<[f64; 2]>, BTreeMap<String, [f64; 2]>);
+
+/// `3.35`, `[1.71, 1.79]`, or a table of either by group.
+fn published(f: &mut Fields, for_each: Option<&str>, names: &Names) -> Published {
+    let mut by_group = BTreeMap::new();
+    let Some(node) = f.get("published") else { return (None, by_group) };
+    let Data::Table(table) = &node.data else {
+        let range = ratio(node);
+        if range.is_none() {
+            f.note(&node.place, "published", not_a_ratio());
+        }
+        return (range, by_group);
+    };
+    let Some(axis_name) = for_each else {
+        let e = Error::new("gives ratios by group, but the claim has no groups");
+        f.note(&node.place, "published", e.help("add for_each = \"scene\", or give one ratio"));
+        return (None, by_group);
+    };
+    for (key, value) in table {
+        let path = format!("published.{}", key.name);
+        if let Some(known) = names.of(axis_name)
+            && !known.contains(&key.name)
+        {
+            f.note(&key.place, &path, unknown_name(axis_name, &key.name, known));
+        } else if let Some(axis) = axis(axis_name)
+            && !(axis.parts)().iter().any(|p| key.name.contains(p.name))
+            && key.name != "none"
+        {
+            let e = Error::new(format!("no value of `{axis_name}` is labelled `{}`", key.name));
+            f.note(&key.place, &path, e.help("use the label that `cullmark plan` prints, quoted"));
+        }
+        match ratio(value) {
+            Some(range) => drop(by_group.insert(key.name.clone(), range)),
+            None => f.note(&value.place, &path, not_a_ratio()),
+        }
+    }
+    (None, by_group)
+}
+
+fn not_a_ratio() -> Error {
+    Error::new("must be a ratio above 0, or a low and a high one")
+        .help("write published = 3.35, published = [1.71, 1.79] or published = { nucleus = 3.5 }")
+}
+
+fn ratio(node: &Node) -> Option<[f64; 2]> {
+    let number = |n: &Node| match n.data {
+        Data::Int(i) => Some(i as f64),
+        Data::Float(x) => Some(x),
+        _ => None,
+    };
+    let range = match node.array() {
+        None => [number(node)?; 2],
+        Some([low, high]) => [number(low)?, number(high)?],
+        Some(_) => return None,
+    };
+    (range[0] > 0.0 && range[0] <= range[1] && range[1].is_finite()).then_some(range)
+}

@@ -1,0 +1,244 @@
+//! The charts of a report, in the order of the page.
+
+use super::claims::Judged;
+use super::curves::{self, Curves};
+use super::figure::Figure;
+use super::forest;
+use super::format::{self, count};
+use super::labels::Grid;
+use super::metrics::{frames, known};
+use super::rows::{self, Datum, Rows};
+use super::scatter::{self, Scatter};
+use super::style::Legend;
+use crate::results::RunResult;
+
+pub fn all(grid: &Grid, judged: &[Judged]) -> Vec<Figure> {
+    if grid.results.runs.is_empty() {
+        return Vec::new();
+    }
+    let legend = Legend::of(grid.results);
+    let mut figures = vec![total_time(grid, &legend), total_model(grid, &legend)];
+    figures.extend([time_per_frame(grid, &legend), triangles_per_frame(grid, &legend)]);
+    if grid.runs().any(|r| !r.errors.is_empty()) {
+        figures.extend(errors(grid, &legend));
+    }
+    figures.extend([memory(grid, &legend), build(grid, &legend)]);
+    figures.extend(forest::draw(judged));
+    figures
+}
+
+/// "2000 frames, 5 repeats", ranges where runs differ.
+pub fn basis(grid: &Grid) -> String {
+    let range = |of: &dyn Fn(&RunResult) -> usize| {
+        let values: Vec<usize> = grid.runs().map(of).filter(|n| *n > 0).collect();
+        Some((*values.iter().min()? as u64, *values.iter().max()? as u64))
+    };
+    let say = |range: Option<(u64, u64)>, one: &str, many: &str| match range {
+        None => format!("no {many}"),
+        Some((a, b)) if a == b => count(a, one, many),
+        Some((a, b)) => format!("{} to {}", format::grouped(&a.to_string()), count(b, one, many)),
+    };
+    let (f, t) = (range(&|r| frames(r)), range(&|r| r.trials.len()));
+    format!("{}, {}", say(f, "frame", "frames"), say(t, "repeat", "repeats"))
+}
+
+fn with_caption(mut figure: Figure, caption: String) -> Figure {
+    figure.caption = caption;
+    figure
+}
+
+fn dot(metric: &'static str) -> impl Fn(&RunResult) -> Option<Datum> {
+    move |r| known(metric).interval(r).map(|(v, low, high)| Datum::Dot(v, low, high))
+}
+
+const WHISKERS: &str = "Dots: median over repeats; whiskers: its 95 % bootstrap interval.";
+
+fn total_time(grid: &Grid, legend: &Legend) -> Figure {
+    let figure = rows::draw(
+        grid,
+        legend,
+        &Rows {
+            id: "total-time",
+            title: "Total culling time over the walkthrough",
+            sub: "Measured processor time of culling alone; less is better.",
+            axis: "culling time (ms)",
+            linear: false,
+            datum: &dot("total_cull_ms"),
+        },
+    );
+    with_caption(figure, format!("Total measured culling time per combination and scene; {}. {WHISKERS}", basis(grid)))
+}
+
+fn total_model(grid: &Grid, legend: &Legend) -> Figure {
+    let figure = rows::draw(
+        grid,
+        legend,
+        &Rows {
+            id: "total-time-modelled",
+            title: "Total frame time over the walkthrough (modelled)",
+            sub: "Modelled, not measured: culling + cost of submitted indices + cost of draw calls.",
+            axis: "modelled frame time, total (ms)",
+            linear: false,
+            datum: &dot("total_frame_ms_model"),
+        },
+    );
+    with_caption(figure, format!("Modelled total frame time; {}. {} {WHISKERS}", basis(grid), model_words(grid)))
+}
+
+/// The formula with the constants of the study.
+pub fn model_words(grid: &Grid) -> String {
+    let model = grid.results.runs.first().map(|r| r.spec.model).unwrap_or_default();
+    format!(
+        "Model: measured culling time + {} ns × indices + {} ns × draw calls.",
+        format::number(model.index_ns, 3),
+        format::number(model.draw_call_ns, 3)
+    )
+}
+
+fn time_per_frame(grid: &Grid, legend: &Legend) -> Figure {
+    let every = grid.results.consolidate_frames.max(1);
+    let figure = curves::draw(
+        grid,
+        legend,
+        &Curves {
+            id: "time-per-frame",
+            title: "Culling time per frame",
+            sub: "Measured; band: smallest to largest of the repeats.",
+            axis: "culling time (µs)",
+            series: &|r| r.trial_cull_ns.iter().map(|t| t.iter().map(|ns| ns / 1e3).collect()).collect(),
+        },
+    );
+    with_caption(
+        figure,
+        format!(
+            "Measured culling time per frame; {}. Each point is the mean of {}; line: median over repeats, band: smallest to largest.",
+            basis(grid),
+            count(every.into(), "frame", "frames")
+        ),
+    )
+}
+
+fn triangles_per_frame(grid: &Grid, legend: &Legend) -> Figure {
+    let every = grid.results.consolidate_frames.max(1);
+    let figure = curves::draw(
+        grid,
+        legend,
+        &Curves {
+            id: "triangles-per-frame",
+            title: "Triangles submitted per frame",
+            sub: "Counted; identical in every repeat, so there is no band.",
+            axis: "triangles",
+            series: &|r| if r.triangles.is_empty() { vec![] } else { vec![r.triangles.clone()] },
+        },
+    );
+    with_caption(
+        figure,
+        format!(
+            "Triangles submitted per frame; {}. Each point is the mean of {}. Counts must agree between repeats, or the run fails.",
+            basis(grid),
+            count(every.into(), "frame", "frames")
+        ),
+    )
+}
+
+fn errors(grid: &Grid, legend: &Legend) -> Vec<Figure> {
+    let judged = grid.runs().map(|r| r.errors.len()).max().unwrap_or(0);
+    let samples = format!("Errors at {} of each path.", count(judged as u64, "judged frame", "judged frames"));
+    let front = "Dashed: Pareto front; what it dominates is faded.";
+    let pair = |x: &'static str, y: &'static str| move |r: &RunResult| Some((known(x).value(r)?, known(y).value(r)?));
+    let measured = pair("median_frame_us", "false_cull_ppm");
+    let chart = |what: Scatter, caption: String| with_caption(scatter::draw(grid, legend, &what), caption);
+    vec![
+        chart(
+            Scatter {
+                id: "time-against-error",
+                title: "Culling time against false culls",
+                sub: "Lower left is better. Combinations that cull nothing are left out: they would win by doing nothing.",
+                x_axis: "culling time of the median frame (µs)",
+                y_axis: "false-cull pixels per million",
+                zero_bin: true,
+                point: &|r| if r.culling == "none" { None } else { measured(r) },
+            },
+            format!(
+                "Measured culling time of the median frame against pixels that lost their triangle; {}. {samples} {front} The shaded bin holds exact zeros.",
+                basis(grid)
+            ),
+        ),
+        chart(
+            Scatter {
+                id: "time-against-error-modelled",
+                title: "Frame time (modelled) against false culls",
+                sub: "Modelled frame time, so that what is submitted in vain costs something. Lower left is better.",
+                x_axis: "modelled frame time, mean (ms)",
+                y_axis: "false-cull pixels per million",
+                zero_bin: true,
+                point: &pair("frame_ms_model", "false_cull_ppm"),
+            },
+            format!(
+                "Modelled frame time against pixels that lost their triangle; {}. {} {samples} {front}",
+                basis(grid),
+                model_words(grid)
+            ),
+        ),
+        chart(
+            Scatter {
+                id: "time-against-over-submission",
+                title: "Culling time against over-submission",
+                sub: "1 would be drawing exactly what is seen. Lower left is better.",
+                x_axis: "culling time of the median frame (µs)",
+                y_axis: "submitted / visible triangles",
+                zero_bin: false,
+                point: &pair("median_frame_us", "over_submission"),
+            },
+            format!(
+                "Measured culling time of the median frame against over-submission; {}. {samples} {front}",
+                basis(grid)
+            ),
+        ),
+    ]
+}
+
+fn memory(grid: &Grid, legend: &Legend) -> Figure {
+    let figure = rows::draw(
+        grid,
+        legend,
+        &Rows {
+            id: "memory",
+            title: "Memory of structure and tests",
+            sub: "Counted bytes; full: the structure, pale: the per-node columns of the tests.",
+            axis: "memory (MiB)",
+            linear: true,
+            datum: &|r| {
+                let all = known("structure_mib").value(r)?;
+                let tests = known("test_mib").value(r).unwrap_or(0.0);
+                Some(Datum::Bar(vec![(all - tests, 1.0), (tests, 0.45)]))
+            },
+        },
+    );
+    with_caption(
+        figure,
+        "Memory of the structure and of the tests' columns, counted by the program; the same in every repeat. \
+         Peak resident sets, the scene included, are in the table."
+            .into(),
+    )
+}
+
+fn build(grid: &Grid, legend: &Legend) -> Figure {
+    let figure = rows::draw(
+        grid,
+        legend,
+        &Rows {
+            id: "build-time",
+            title: "Building time",
+            sub: "Measured; full: the structure with flattening, pale: preparing the tests. Medians over repeats.",
+            axis: "time to build (ms)",
+            linear: true,
+            datum: &|r| {
+                let build = known("build_ms").value(r)?;
+                let prepare = known("prepare_ms").value(r).unwrap_or(0.0);
+                Some(Datum::Bar(vec![(build, 1.0), (prepare, 0.45)]))
+            },
+        },
+    );
+    with_caption(figure, format!("Measured time to build the structure and to prepare the tests; {}.", basis(grid)))
+}

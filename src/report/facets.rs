@@ -1,0 +1,142 @@
+//! Layout shared by the charts: small multiples, axes, legends.
+
+use super::figure::{Figure, Part, Rect, plain, text_box};
+use super::font;
+use super::scale::Scale;
+use super::style::{FRAME, GRID, INK, Legend, MUTED};
+
+/// Em sizes.
+pub const TITLE: f64 = 15.0;
+pub const HEAD: f64 = 12.0;
+pub const BODY: f64 = 11.0;
+pub const SMALL: f64 = 10.0;
+
+/// Places `count` panels of `w` x `h` in rows of `columns` below `top`, after `left` pixels.
+pub fn panels(
+    count: usize,
+    columns: usize,
+    left: f64,
+    top: f64,
+    (w, h): (f64, f64),
+    (gap_x, gap_y): (f64, f64),
+) -> Vec<Rect> {
+    (0..count)
+        .map(|i| {
+            let (column, row) = ((i % columns) as f64, (i / columns) as f64);
+            Rect::new(left + column * (w + gap_x), top + row * (h + gap_y), w, h)
+        })
+        .collect()
+}
+
+/// Title at the top left; returns the y below it.
+pub fn title(figure: &mut Figure, text: &str, sub: &str) -> f64 {
+    figure.label(16.0, 26.0, text, plain(TITLE, INK).bold());
+    if sub.is_empty() {
+        return 40.0;
+    }
+    figure.label(16.0, 45.0, sub, plain(BODY, MUTED));
+    58.0
+}
+
+/// How the legend shows an entry.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Sample {
+    Line,
+    Marker,
+}
+
+/// Height of the legend for a width.
+pub fn legend_height(legend: &Legend, width: f64) -> f64 {
+    legend_rows(legend, width).len() as f64 * 18.0 + 8.0
+}
+
+fn legend_rows(legend: &Legend, width: f64) -> Vec<Vec<usize>> {
+    let mut rows: Vec<Vec<usize>> = vec![Vec::new()];
+    let mut x = 0.0;
+    for (i, (label, _)) in legend.entries.iter().enumerate() {
+        let w = 34.0 + font::width(label, BODY, false) + 18.0;
+        if x + w > width && x > 0.0 {
+            rows.push(Vec::new());
+            x = 0.0;
+        }
+        x += w;
+        rows.last_mut().expect("at least one row").push(i);
+    }
+    rows
+}
+
+/// Draws the legend in rows from (`x`, `y`) downward, outside every plot.
+pub fn legend(figure: &mut Figure, legend: &Legend, x: f64, y: f64, width: f64, sample: Sample) {
+    for (r, row) in legend_rows(legend, width).iter().enumerate() {
+        let (mut at, base) = (x, y + 14.0 + 18.0 * r as f64);
+        for i in row {
+            let (label, look) = &legend.entries[*i];
+            let middle = base - 4.0;
+            if sample == Sample::Line {
+                figure.dashed(&[(at, middle), (at + 26.0, middle)], look.colour, 2.0, 1.0, look.dash);
+            } else {
+                figure.marker(at + 13.0, middle, 4.5, look.shape, look.colour, 1.0);
+            }
+            let r = figure.label(at + 34.0, base, label, plain(BODY, INK));
+            at = r.right() + 18.0;
+        }
+    }
+    let height = legend_height(legend, width);
+    figure.part(Part::Legend, Rect::new(x, y, width, height));
+}
+
+/// Head of a panel, above its plot.
+pub fn panel_head(figure: &mut Figure, plot: Rect, text: &str, note: &str) {
+    let r = figure.label(plot.x, plot.y - 8.0, text, plain(HEAD, INK).bold());
+    if !note.is_empty() {
+        let style = plain(SMALL, MUTED);
+        let x = r.right() + 8.0;
+        if text_box(x, 0.0, note, style).right() <= plot.right() {
+            figure.label(x, plot.y - 8.0, note, style);
+        }
+    }
+}
+
+/// Vertical grid lines and labels below: an x axis. Labels that would touch are left out.
+pub fn x_axis(figure: &mut Figure, plot: Rect, scale: &Scale, wanted: usize, labels: bool) {
+    let mut free_from = f64::NEG_INFINITY;
+    for tick in scale.ticks(wanted) {
+        let x = scale.at(tick.at);
+        if tick.label.is_empty() {
+            figure.segment((x, plot.bottom()), (x, plot.bottom() - 3.0), FRAME, 0.8);
+            continue;
+        }
+        figure.segment((x, plot.y), (x, plot.bottom()), GRID, 1.0);
+        figure.segment((x, plot.bottom()), (x, plot.bottom() + 4.0), FRAME, 1.0);
+        let style = plain(SMALL, MUTED).middle();
+        let r = text_box(x, plot.bottom() + 15.0, &tick.label, style);
+        if labels && r.x > free_from {
+            figure.label(x, plot.bottom() + 15.0, &tick.label, style);
+            free_from = r.right() + 6.0;
+        }
+    }
+    figure.segment((plot.x, plot.bottom()), (plot.right(), plot.bottom()), FRAME, 1.0);
+}
+
+/// Horizontal grid lines and labels at the left: a y axis.
+pub fn y_axis(figure: &mut Figure, plot: Rect, scale: &Scale, wanted: usize) {
+    for tick in scale.ticks(wanted) {
+        let y = scale.at(tick.at);
+        if tick.label.is_empty() {
+            figure.segment((plot.x, y), (plot.x + 3.0, y), FRAME, 0.8);
+            continue;
+        }
+        figure.segment((plot.x, y), (plot.right(), y), GRID, 1.0);
+        figure.label(plot.x - 7.0, y + 3.6, &tick.label, plain(SMALL, MUTED).end());
+    }
+    figure.segment((plot.x, plot.y), (plot.x, plot.bottom()), FRAME, 1.0);
+}
+
+pub fn x_title(figure: &mut Figure, plot: Rect, text: &str) {
+    figure.label(plot.x + plot.w / 2.0, plot.bottom() + 32.0, text, plain(BODY, INK).middle());
+}
+
+/// Upward text left of the tick labels, `gap` pixels from the plot.
+pub fn y_title(figure: &mut Figure, plot: Rect, text: &str, gap: f64) {
+    figure.upright(plot.x - gap, plot.y + plot.h / 2.0, text, plain(BODY, INK).middle());
+}

@@ -1,0 +1,252 @@
+//! Every number a report, a query, a comparison or a claim can be about, in one table.
+
+use crate::error::{Error, Result, did_you_mean};
+use crate::record::TimeModel;
+use crate::results::{RunResult, RunStatus};
+use crate::stats;
+
+/// Where a number comes from; decides whether it has an interval and whether a
+/// wrong run may show it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A clock or the operating system: differs between trials.
+    Measured,
+    /// Derived from measured time by the stated model of the renderer.
+    Modelled,
+    /// Identical in every trial.
+    Counted,
+    /// Found by the oracle at the judged frames.
+    Judged,
+}
+
+pub struct Metric {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub kind: Kind,
+    pub about: &'static str,
+    /// One value a trial for measured and modelled metrics, else one value; none where unknown.
+    values: fn(&RunResult) -> Vec<f64>,
+    /// How the values of trials become one.
+    fold: fn(&[f64]) -> f64,
+}
+
+const MIB: f64 = 1024.0 * 1024.0;
+
+const fn metric(
+    name: &'static str,
+    unit: &'static str,
+    kind: Kind,
+    about: &'static str,
+    values: fn(&RunResult) -> Vec<f64>,
+) -> Metric {
+    Metric { name, unit, kind, about, values, fold: stats::median }
+}
+
+use Kind::{Counted, Judged, Measured, Modelled};
+
+/// Sorted by name.
+pub static METRICS: &[Metric] = &[
+    metric("build_ms", "ms", Measured, "building the structure, flattening included", |r| {
+        r.trials.iter().map(|t| t.build_ns / 1e6).collect()
+    }),
+    metric("cull_ms", "ms", Measured, "culling time a frame, mean over the path", |r| per_frame(r, stats::mean, 1e6)),
+    metric("depth", "levels", Counted, "depth of the tree", |r| counter(r, "depth")),
+    metric("false_cull_ppm", "px/M", Judged, "pixels whose triangle was not submitted, per million pixels", |r| {
+        share(r, |e| e.false_cull_pixels as f64, |e| e.pixels as f64, 1e6)
+    }),
+    metric("false_culls", "triangles", Judged, "visible triangles not submitted, summed over judged frames", |r| {
+        judged(r, |e| e.false_culls as f64)
+    }),
+    metric("frame_ms_model", "ms", Modelled, "culling + indices + draw calls, a frame, mean over the path", |r| {
+        modelled(r).iter().map(|total| total / frames(r) as f64).collect()
+    }),
+    metric("judged_frames", "frames", Judged, "frames compared with the truth", |r| {
+        if r.errors.is_empty() { vec![] } else { vec![r.errors.len() as f64] }
+    }),
+    metric("largest_blob_px", "px", Judged, "largest connected hole in any judged frame", |r| {
+        let largest = r.errors.iter().map(|e| e.largest_blob_px).max();
+        largest.map(|v| v as f64).into_iter().collect()
+    }),
+    metric("leaves", "leaves", Counted, "leaves of the structure", |r| counter(r, "leaves")),
+    Metric {
+        fold: stats::mad,
+        ..metric("mad_total_cull_ms", "ms", Measured, "median absolute deviation of the total over trials", totals)
+    },
+    metric("mean_draw_calls", "calls", Counted, "draw calls a frame", |r| average(&r.draw_calls)),
+    metric("mean_nodes_visited", "nodes", Counted, "nodes judged a frame", |r| average(&r.nodes_visited)),
+    metric("mean_triangles", "triangles", Counted, "triangles submitted a frame", |r| average(&r.triangles)),
+    metric("median_frame_us", "µs", Measured, "culling time of the median frame", |r| {
+        per_frame(r, stats::median, 1e3)
+    }),
+    metric("nodes", "nodes", Counted, "nodes of the structure, root included", |r| counter(r, "nodes")),
+    Metric {
+        fold: |v| v.iter().copied().fold(f64::NAN, f64::max),
+        ..metric("noise", "", Measured, "sentinel over its usual time, worst trial; 1 is quiet", |r| {
+            r.trials.iter().map(|t| t.noise).collect()
+        })
+    },
+    metric("over_submission", "", Judged, "submitted over visible triangles, mean over judged frames", |r| {
+        let seen: Vec<f64> = r.errors.iter().map(|e| e.over_submission()).filter(|x| x.is_finite()).collect();
+        average(&seen)
+    }),
+    metric("p99_cull_ms", "ms", Measured, "99th percentile of culling time a frame", |r| per_frame(r, p99, 1e6)),
+    metric("p99_frame_us", "µs", Measured, "99th percentile of culling time a frame", |r| per_frame(r, p99, 1e3)),
+    metric("peak_rss_mib", "MiB", Measured, "peak resident memory of the trial, the scene included", |r| {
+        r.trials.iter().map(|t| t.peak_rss_bytes / MIB).collect()
+    }),
+    metric("potential_lost", "triangles", Judged, "members of the exact set lost, seen or hidden", |r| {
+        judged(r, |e| e.potential_lost as f64)
+    }),
+    metric("prepare_ms", "ms", Measured, "building the per-node columns of the tests", |r| {
+        r.trials.iter().map(|t| t.prepare_ns / 1e6).collect()
+    }),
+    metric("replication", "", Counted, "entries of the structure over triangles of the scene", |r| {
+        match (counter(r, "entries").first(), counter(r, "scene_triangles").first()) {
+            (Some(e), Some(t)) if *t > 0.0 => vec![e / t],
+            _ => vec![],
+        }
+    }),
+    metric("scene_triangles", "triangles", Counted, "triangles of the scene", |r| counter(r, "scene_triangles")),
+    metric("structure_mib", "MiB", Counted, "bytes of the structure and of the tests' columns", |r| {
+        let tests = counter(r, "test_bytes").first().copied().unwrap_or(0.0);
+        counter(r, "structure_bytes").iter().map(|b| (b + tests) / MIB).collect()
+    }),
+    metric("test_mib", "MiB", Counted, "bytes of the tests' columns alone", |r| {
+        counter(r, "test_bytes").iter().map(|b| b / MIB).collect()
+    }),
+    metric("total_cull_ms", "ms", Measured, "culling time summed over the path", totals),
+    metric("total_frame_ms_model", "ms", Modelled, "modelled frame time summed over the path", modelled),
+    metric("trials", "trials", Counted, "accepted trials", |r| vec![r.trials.len() as f64]),
+];
+
+impl Metric {
+    /// One value a trial where it is measured or modelled, else at most one.
+    /// Empty where unknown: not judged, not started, failed; and times are
+    /// withheld from a run that is wrong for its class.
+    pub fn values(&self, run: &RunResult) -> Vec<f64> {
+        let withheld = match self.kind {
+            Measured | Modelled => matches!(run.status, RunStatus::Wrong | RunStatus::Failed),
+            Counted | Judged => false,
+        };
+        if withheld { Vec::new() } else { (self.values)(run).into_iter().filter(|v| v.is_finite()).collect() }
+    }
+
+    pub fn value(&self, run: &RunResult) -> Option<f64> {
+        let values = self.values(run);
+        if values.is_empty() { None } else { Some((self.fold)(&values)) }
+    }
+
+    /// Value with its 95 % interval over trials; equal ends where nothing varies or one trial is all there is.
+    pub fn interval(&self, run: &RunResult) -> Option<(f64, f64, f64)> {
+        let values = self.values(run);
+        let value = self.value(run)?;
+        if values.len() < 2 || self.name.starts_with("mad_") || self.name == "noise" {
+            return Some((value, value, value));
+        }
+        let (low, high) = stats::bootstrap_ci_median(&values, stats::RESAMPLES, SEED);
+        Some((value, low, high))
+    }
+
+    /// `total_cull_ms (ms)`.
+    pub fn heading(&self) -> String {
+        if self.unit.is_empty() { self.name.to_string() } else { format!("{} ({})", self.name, self.unit) }
+    }
+}
+
+/// Seed of every bootstrap in reports: same results, same bytes.
+pub const SEED: u64 = 2014;
+
+pub fn find(name: &str) -> Option<&'static Metric> {
+    METRICS.binary_search_by(|m| m.name.cmp(name)).ok().map(|i| &METRICS[i])
+}
+
+/// # Errors
+/// Names the metric, and the nearest one there is.
+pub fn get(name: &str) -> Result<&'static Metric> {
+    find(name).ok_or_else(|| {
+        let near = did_you_mean(name, METRICS.iter().map(|m| m.name));
+        let all = || format!("metrics: {}", METRICS.iter().map(|m| m.name).collect::<Vec<_>>().join(", "));
+        Error::new(format!("there is no metric `{name}`"))
+            .help(near.map_or_else(all, |n| format!("did you mean `{n}`?")))
+    })
+}
+
+/// For code of ours that names a metric of [`METRICS`].
+///
+/// # Panics
+/// If the table lacks it.
+pub fn known(name: &str) -> &'static Metric {
+    find(name).unwrap_or_else(|| panic!("no metric {name}"))
+}
+
+pub fn frames(run: &RunResult) -> usize {
+    run.cull_ns.len().max(run.triangles.len())
+}
+
+/// The modelled part of every frame beside culling, ns.
+pub fn render_ns(model: &TimeModel, triangles: f64, draw_calls: f64) -> f64 {
+    model.index_ns * 3.0 * triangles + model.draw_call_ns * draw_calls
+}
+
+/// Modelled time of the path, ms, one value a trial.
+fn modelled(run: &RunResult) -> Vec<f64> {
+    if run.triangles.is_empty() || run.triangles.len() != run.draw_calls.len() {
+        return Vec::new();
+    }
+    let frames = run.triangles.iter().zip(&run.draw_calls);
+    let render: f64 = frames.map(|(t, d)| render_ns(&run.spec.model, *t, *d)).sum();
+    totals(run).iter().map(|cull| cull + render / 1e6).collect()
+}
+
+fn totals(run: &RunResult) -> Vec<f64> {
+    run.trials.iter().map(|t| t.total_cull_ns / 1e6).collect()
+}
+
+/// A statistic of the frames of every trial.
+fn per_frame(run: &RunResult, statistic: fn(&[f64]) -> f64, unit: f64) -> Vec<f64> {
+    run.trial_cull_ns.iter().filter(|t| !t.is_empty()).map(|t| statistic(t) / unit).collect()
+}
+
+fn p99(values: &[f64]) -> f64 {
+    stats::quantile(values, 0.99)
+}
+
+fn average(values: &[f64]) -> Vec<f64> {
+    if values.is_empty() { vec![] } else { vec![stats::mean(values)] }
+}
+
+fn counter(run: &RunResult, name: &str) -> Vec<f64> {
+    run.counters.get(name).copied().into_iter().collect()
+}
+
+type OfFrame = fn(&crate::record::FrameErrors) -> f64;
+
+fn judged(run: &RunResult, of: OfFrame) -> Vec<f64> {
+    if run.errors.is_empty() { vec![] } else { vec![run.errors.iter().map(of).sum()] }
+}
+
+fn share(run: &RunResult, part: OfFrame, whole: OfFrame, unit: f64) -> Vec<f64> {
+    let (part, whole): (f64, f64) = (run.errors.iter().map(part).sum(), run.errors.iter().map(whole).sum());
+    if whole > 0.0 { vec![part / whole * unit] } else { vec![] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn metrics_are_sorted_and_hold_all_that_claims_may_name() {
+        assert!(METRICS.windows(2).all(|w| w[0].name < w[1].name));
+        for claimed in crate::claim::METRICS {
+            let ours = find(claimed.name).unwrap_or_else(|| panic!("claims may name {}", claimed.name));
+            assert_eq!(ours.unit, claimed.unit, "{}", ours.name);
+            assert_eq!(ours.kind == Modelled, claimed.modelled, "{}", ours.name);
+        }
+    }
+
+    #[test]
+    fn a_misspelt_metric_gets_a_suggestion() {
+        let e = get("total_cul_ms").err().unwrap();
+        assert!(e.to_string().contains("did you mean `total_cull_ms`"), "{e}");
+    }
+}

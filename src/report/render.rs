@@ -1,0 +1,200 @@
+//! A [`Figure`] to SVG and PNG through plotters' two backends.
+
+use super::figure::{Anchor, Figure, Mark, TextStyle};
+use super::font;
+use super::format::html;
+use super::style::{Colour, PAPER};
+use crate::error::{Error, Result};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// plotters places by whole pixels, even in SVG: everything is drawn this much
+/// larger and the view box scales it back, or curves would wobble.
+const SVG_FINE: f64 = 10.0;
+/// PNG pixels a figure pixel.
+const PNG_SCALE: usize = 2;
+/// Samples a PNG pixel and axis: plotters smooths only hairlines by itself.
+const PNG_SAMPLES: usize = 2;
+
+/// The SVG text. `paper` paints the background, for files that stand alone.
+pub fn svg(figure: &Figure, paper: bool) -> Result<String> {
+    font::register();
+    let size = |x: f64| (x * SVG_FINE).round() as u32;
+    let mut out = String::new();
+    {
+        let root = SVGBackend::with_string(&mut out, (size(figure.width), size(figure.height))).into_drawing_area();
+        // plotters writes the em as size / 1.24 whatever the font is.
+        draw(figure, &root, SVG_FINE, 1.24, Baseline::AtAnchor, paper)?;
+    }
+    Ok(finish_svg(&out, figure))
+}
+
+/// Gives the document its real size, a title and a description for screen
+/// readers, the font stack, and text on its baseline.
+fn finish_svg(raw: &str, figure: &Figure) -> String {
+    let open_end = raw.find('>').map_or(0, |i| i + 1);
+    let (w, h) = (figure.width, figure.height);
+    let id = &figure.id;
+    let head = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {} {}\" role=\"img\" \
+         aria-labelledby=\"{id}-title {id}-desc\">\n<title id=\"{id}-title\">{}</title>\n<desc id=\"{id}-desc\">{}</desc>",
+        w * SVG_FINE,
+        h * SVG_FINE,
+        html(&figure.title),
+        html(&figure.description),
+    );
+    // `dy` would move the baseline by font metrics of the reader's machine; and
+    // plotters leaves a line end inside the text, which browsers draw as a space.
+    let body = raw[open_end..]
+        .replace(" dy=\"-0.5ex\"", "")
+        .replace(&format!("font-family=\"{}\"", font::FAMILY), &format!("font-family=\"{}\"", font::STACK))
+        .replace("font-weight=\"bold\"", "font-weight=\"600\"")
+        .replace("\n</text>", "</text>");
+    let mut body = trim_text(&body);
+    if !body.ends_with('\n') {
+        body.push('\n');
+    }
+    head + &body
+}
+
+/// Removes the line end plotters writes after `<text ...>`.
+fn trim_text(body: &str) -> String {
+    let mut out = String::with_capacity(body.len());
+    let mut in_text = false;
+    for line in body.lines() {
+        out += line;
+        in_text = if line.starts_with("<text") && !line.contains("</text>") {
+            true
+        } else {
+            in_text && !line.contains("</text>")
+        };
+        if !in_text {
+            out.push('\n');
+        }
+    }
+    out
+}
+
+/// An RGB PNG at twice the figure's size.
+pub fn png(figure: &Figure) -> Result<Vec<u8>> {
+    font::register();
+    let scale = PNG_SCALE * PNG_SAMPLES;
+    let size = |x: f64| (x.ceil() as usize) * PNG_SCALE;
+    let (w, h) = (size(figure.width), size(figure.height));
+    let mut fine = vec![0u8; 3 * w * h * PNG_SAMPLES * PNG_SAMPLES];
+    {
+        let size = ((w * PNG_SAMPLES) as u32, (h * PNG_SAMPLES) as u32);
+        let root = BitMapBackend::with_buffer(&mut fine, size).into_drawing_area();
+        draw(figure, &root, scale as f64, font::HEIGHT_EM, Baseline::HalfSizeBelow, true)?;
+    }
+    let pixels = average(&fine, w, h);
+    let mut out = Vec::new();
+    let bad = |e: png::EncodingError| Error::new(format!("cannot encode {}.png: {e}", figure.id));
+    let mut encoder = png::Encoder::new(&mut out, w as u32, h as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    // 2 pixels a figure pixel of 1/96 inch.
+    let per_metre = (96.0 * PNG_SCALE as f64 / 0.0254).round() as u32;
+    encoder.set_pixel_dims(Some(png::PixelDimensions { xppu: per_metre, yppu: per_metre, unit: png::Unit::Meter }));
+    let mut writer = encoder.write_header().map_err(bad)?;
+    writer.write_image_data(&pixels).map_err(bad)?;
+    writer.finish().map_err(bad)?;
+    Ok(out)
+}
+
+/// Mean of each square of samples.
+fn average(fine: &[u8], w: usize, h: usize) -> Vec<u8> {
+    let s = PNG_SAMPLES;
+    let row = 3 * w * s;
+    let mut out = Vec::with_capacity(3 * w * h);
+    for y in 0..h {
+        for x in 0..w {
+            for c in 0..3 {
+                let samples = (0..s * s).map(|i| u32::from(fine[(y * s + i / s) * row + (x * s + i % s) * 3 + c]));
+                out.push((samples.sum::<u32>() / (s * s) as u32) as u8);
+            }
+        }
+    }
+    out
+}
+
+/// Where a backend puts text whose anchor is the bottom.
+#[derive(Clone, Copy, PartialEq)]
+enum Baseline {
+    /// SVG, once `dy` is removed.
+    AtAnchor,
+    /// The rasteriser puts the baseline half a size below the top of the text.
+    HalfSizeBelow,
+}
+
+fn rgba(c: Colour, alpha: f64) -> RGBAColor {
+    RGBAColor((c >> 16) as u8, (c >> 8) as u8, c as u8, alpha)
+}
+
+type Area<'a, B> = DrawingArea<B, plotters::coord::Shift>;
+
+fn draw<B: DrawingBackend>(
+    figure: &Figure,
+    root: &Area<'_, B>,
+    scale: f64,
+    height_em: f64,
+    baseline: Baseline,
+    paper: bool,
+) -> Result<()> {
+    let bad = |e: DrawingAreaErrorKind<B::ErrorType>| Error::new(format!("cannot draw {}: {e}", figure.id));
+    let at = |p: &(f64, f64)| ((p.0 * scale).round() as i32, (p.1 * scale).round() as i32);
+    if paper {
+        root.fill(&rgba(PAPER, 1.0)).map_err(bad)?;
+    }
+    for mark in &figure.marks {
+        match mark {
+            Mark::Line { points, colour, width, alpha } => {
+                let stroke = rgba(*colour, *alpha).stroke_width((width * scale).round().max(1.0) as u32);
+                root.draw(&PathElement::new(points.iter().map(at).collect::<Vec<_>>(), stroke)).map_err(bad)?;
+            }
+            Mark::Polygon { points, colour, alpha } => {
+                let fill = rgba(*colour, *alpha).filled();
+                root.draw(&Polygon::new(points.iter().map(at).collect::<Vec<_>>(), fill)).map_err(bad)?;
+            }
+            Mark::Circle { x, y, radius, colour, alpha } => {
+                let fill = rgba(*colour, *alpha).filled();
+                root.draw(&Circle::new(at(&(*x, *y)), (radius * scale).round() as i32, fill)).map_err(bad)?;
+            }
+            Mark::Text { x, y, text, style, upright } => {
+                draw_text(root, at(&(*x, *y)), text, style, *upright, (scale, height_em), baseline).map_err(bad)?;
+            }
+        }
+    }
+    root.present().map_err(bad)
+}
+
+fn draw_text<B: DrawingBackend>(
+    root: &Area<'_, B>,
+    (mut x, mut y): (i32, i32),
+    text: &str,
+    style: &TextStyle,
+    upright: bool,
+    (scale, height_em): (f64, f64),
+    baseline: Baseline,
+) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+    let size = style.size * scale * height_em;
+    let h = match style.anchor {
+        Anchor::Start => HPos::Left,
+        Anchor::Middle => HPos::Center,
+        Anchor::End => HPos::Right,
+    };
+    let mut v = VPos::Bottom;
+    if baseline == Baseline::HalfSizeBelow {
+        v = VPos::Top;
+        let half = (size / 2.0).round() as i32;
+        if upright { x -= half } else { y -= half }
+    }
+    let weight = if style.bold { FontStyle::Bold } else { FontStyle::Normal };
+    let mut font = FontDesc::new(FontFamily::Name(font::FAMILY), size, weight);
+    if upright {
+        font = font.transform(FontTransform::Rotate270);
+    }
+    let ink = rgba(style.colour, style.alpha);
+    let style = plotters::style::TextStyle::from(font).color(&ink).pos(Pos::new(h, v));
+    root.draw(&Text::new(text.to_string(), (x, y), style))
+}

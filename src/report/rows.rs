@@ -1,0 +1,162 @@
+//! Charts with one row a combination and one panel a scene: total times, memory, build.
+//! Labels stand beside the data, so no legend is needed, and a combination
+//! without a number says why in its own row.
+
+use super::facets::{self, BODY, SMALL};
+use super::figure::{Figure, Part, Rect, plain};
+use super::font;
+use super::labels::Grid;
+use super::scale::Scale;
+use super::style::{ALARM, Colour, INK, Legend, MUTED, SHADE};
+use crate::results::{RunResult, RunStatus};
+
+const ROW: f64 = 19.0;
+
+/// What a cell shows.
+pub enum Datum {
+    /// Value, ends of the interval.
+    Dot(f64, f64, f64),
+    /// Lengths of a stacked bar with the opacity of each.
+    Bar(Vec<(f64, f64)>),
+}
+
+impl Datum {
+    fn extent(&self) -> Vec<f64> {
+        match self {
+            Datum::Dot(v, low, high) => vec![*v, *low, *high],
+            Datum::Bar(parts) => vec![parts.iter().map(|p| p.0).sum()],
+        }
+    }
+}
+
+pub struct Rows<'a> {
+    pub id: &'a str,
+    pub title: &'a str,
+    pub sub: &'a str,
+    /// Quantity and unit.
+    pub axis: &'a str,
+    /// Always from zero, as bars must be.
+    pub linear: bool,
+    pub datum: &'a dyn Fn(&RunResult) -> Option<Datum>,
+}
+
+/// The words for a cell without a number; the flag asks for hatching.
+pub fn absence(run: Option<&RunResult>) -> (&'static str, bool, Colour) {
+    match run.map(|r| r.status) {
+        None => ("not in the matrix", false, MUTED),
+        Some(RunStatus::Pending) => ("pending", false, MUTED),
+        Some(RunStatus::Failed) => ("✕ failed", true, ALARM),
+        Some(RunStatus::Wrong) => ("✕ wrong: withheld", true, ALARM),
+        Some(RunStatus::Done) => ("no value", false, MUTED),
+    }
+}
+
+pub fn draw(grid: &Grid, legend: &Legend, what: &Rows) -> Figure {
+    let data: Vec<Vec<Option<Datum>>> = grid
+        .cells
+        .iter()
+        .map(|row| row.iter().map(|cell| cell.filter(|r| r.status == RunStatus::Done).and_then(what.datum)).collect())
+        .collect();
+    let extent: Vec<f64> = data.iter().flatten().flatten().flat_map(Datum::extent).collect();
+    let scale = if what.linear { Scale::from_zero(extent) } else { Scale::fitting(&extent) };
+
+    let names = grid.combinations.iter().map(|l| font::width(l, BODY, false)).fold(0.0, f64::max);
+    let left = 16.0 + names + 14.0;
+    let columns = grid.places.len().clamp(1, if names > 210.0 { 3 } else { 4 });
+    let rows = grid.places.len().div_ceil(columns);
+    let gap = (22.0, 62.0);
+    let w = ((1000.0 - left - 24.0 - gap.0 * (columns as f64 - 1.0)) / columns as f64).clamp(120.0, 420.0);
+    let h = ROW * grid.combinations.len() as f64 + 6.0;
+    let width = left + w * columns as f64 + gap.0 * (columns as f64 - 1.0) + 24.0;
+    let width = width.max(16.0 + font::width(what.sub, BODY, false) + 16.0);
+    let top = 58.0 + 26.0;
+    let height = top + rows as f64 * h + (rows as f64 - 1.0) * gap.1 + 46.0;
+    let mut figure = Figure::new(what.id, what.title, width, height);
+    facets::title(&mut figure, what.title, what.sub);
+
+    for (i, plot) in facets::panels(grid.places.len(), columns, left, top, (w, h), gap).into_iter().enumerate() {
+        let scale = scale.onto(plot.x, plot.right());
+        figure.part(Part::Plot, plot);
+        facets::panel_head(&mut figure, plot, &grid.places[i], "");
+        facets::x_axis(&mut figure, plot, &scale, (w / 55.0) as usize, true);
+        let lowest = i + columns >= grid.places.len();
+        if lowest {
+            facets::x_title(&mut figure, plot, what.axis);
+        }
+        for (c, label) in grid.combinations.iter().enumerate() {
+            let y = plot.y + 3.0 + ROW * (c as f64 + 0.5);
+            if i % columns == 0 {
+                let x = left - 12.0;
+                figure.label(x, y + 3.8, label, plain(BODY, INK).end());
+            }
+            let look = legend.look(label);
+            match &data[i][c] {
+                Some(datum) => draw_datum(&mut figure, &scale, y, datum, look),
+                None => draw_absence(&mut figure, plot, y, grid.cells[i][c]),
+            }
+        }
+    }
+    figure.description = describe(grid, &data, what);
+    figure
+}
+
+fn draw_datum(figure: &mut Figure, scale: &Scale, y: f64, datum: &Datum, look: super::style::Look) {
+    match datum {
+        Datum::Dot(value, low, high) => {
+            let (x, x0, x1) = (scale.at(*value), scale.at(*low), scale.at(*high));
+            figure.segment((scale.from, y), (x, y), super::style::GRID, 1.0);
+            if x1 - x0 > 0.5 {
+                figure.segment((x0, y), (x1, y), look.colour, 1.8);
+                for end in [x0, x1] {
+                    figure.segment((end, y - 4.0), (end, y + 4.0), look.colour, 1.8);
+                }
+            }
+            figure.marker(x, y, 4.4, look.shape, look.colour, 1.0);
+        }
+        Datum::Bar(parts) => {
+            let mut sum = 0.0;
+            for (length, alpha) in parts {
+                let (x0, x1) = (scale.at(sum), scale.at(sum + length));
+                figure.rect(Rect::new(x0, y - 6.0, (x1 - x0).max(0.6), 12.0), look.colour, *alpha);
+                sum += length;
+            }
+        }
+    }
+}
+
+fn draw_absence(figure: &mut Figure, plot: Rect, y: f64, run: Option<&RunResult>) {
+    let (words, hatched, colour) = absence(run);
+    let cell = Rect::new(plot.x + 1.0, y - ROW / 2.0 + 2.0, plot.w - 2.0, ROW - 4.0);
+    if run.is_some() {
+        figure.rect(cell, SHADE, 1.0);
+    }
+    let style = plain(SMALL, colour);
+    let text = super::figure::text_box(plot.x + 8.0, y + 3.6, words, style);
+    if hatched {
+        // The hatch keeps clear of the words.
+        let from = text.right() + 6.0;
+        figure.hatch(Rect::new(from, cell.y, (cell.right() - from).max(0.0), cell.h), colour, 6.0);
+    }
+    figure.label(plot.x + 8.0, y + 3.6, words, style);
+}
+
+/// The chart in words.
+fn describe(grid: &Grid, data: &[Vec<Option<Datum>>], what: &Rows) -> String {
+    let mut out = format!("{}. {}. ", what.title, what.axis);
+    for (place, row) in grid.places.iter().zip(data) {
+        out += &format!("{place}: ");
+        let parts: Vec<String> = grid
+            .combinations
+            .iter()
+            .zip(row)
+            .zip(&grid.cells[grid.places.iter().position(|p| p == place).unwrap_or(0)])
+            .map(|((label, datum), cell)| match datum {
+                Some(d) => format!("{label} {}", super::format::number(d.extent()[0], 3)),
+                None => format!("{label} {}", absence(*cell).0),
+            })
+            .collect();
+        out += &parts.join(", ");
+        out += ". ";
+    }
+    out.trim_end().to_string()
+}

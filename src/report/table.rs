@@ -1,0 +1,230 @@
+//! One table, four ways out: HTML, CSV, Markdown, LaTeX (booktabs).
+
+use super::format;
+use crate::results::RunStatus;
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell {
+    Text(String),
+    Number(f64),
+    /// Value, ends of its 95 % interval.
+    Interval(f64, f64, f64),
+    Status(RunStatus),
+    Missing,
+}
+
+#[derive(Debug, Clone)]
+pub struct Column {
+    pub name: String,
+    pub unit: String,
+    pub about: String,
+    pub numeric: bool,
+    /// CSV gets two more columns, with the ends.
+    pub interval: bool,
+}
+
+pub fn column(name: &str, unit: &str, about: &str) -> Column {
+    Column { name: name.into(), unit: unit.into(), about: about.into(), numeric: true, interval: false }
+}
+
+impl Column {
+    pub fn text(name: &str) -> Column {
+        Column { numeric: false, ..column(name, "", "") }
+    }
+
+    pub fn with_interval(mut self) -> Column {
+        self.interval = true;
+        self
+    }
+
+    fn heading(&self) -> String {
+        if self.unit.is_empty() { self.name.clone() } else { format!("{} ({})", self.name, self.unit) }
+    }
+}
+
+#[derive(Debug, Clone)]
+pub struct Table {
+    pub id: String,
+    pub title: String,
+    pub caption: String,
+    pub columns: Vec<Column>,
+    /// Leading columns that name the row.
+    pub heads: usize,
+    pub rows: Vec<Vec<Cell>>,
+}
+
+pub fn status_word(status: RunStatus) -> &'static str {
+    match status {
+        RunStatus::Pending => "pending",
+        RunStatus::Done => "done",
+        RunStatus::Failed => "failed",
+        RunStatus::Wrong => "wrong",
+    }
+}
+
+pub fn number(value: Option<f64>) -> Cell {
+    value.map_or(Cell::Missing, Cell::Number)
+}
+
+pub fn interval(value: Option<(f64, f64, f64)>) -> Cell {
+    value.map_or(Cell::Missing, |(v, low, high)| Cell::Interval(v, low, high))
+}
+
+impl Cell {
+    /// For people.
+    pub fn show(&self) -> String {
+        match self {
+            Cell::Text(t) => t.clone(),
+            Cell::Number(x) => format::number(*x, 3),
+            Cell::Interval(v, low, high) => format::interval(*v, *low, *high),
+            Cell::Status(s) => status_word(*s).into(),
+            Cell::Missing => "–".into(),
+        }
+    }
+
+    /// For programs: all digits, nothing grouped; empty where there is none.
+    fn raw(&self, interval: bool) -> Vec<String> {
+        let plain = |x: f64| if x.is_finite() { format!("{x}") } else { String::new() };
+        let mut fields = match self {
+            Cell::Text(t) => vec![t.clone()],
+            Cell::Number(x) => vec![plain(*x)],
+            Cell::Interval(v, low, high) => vec![plain(*v), plain(*low), plain(*high)],
+            Cell::Status(s) => vec![status_word(*s).into()],
+            Cell::Missing => vec![String::new()],
+        };
+        fields.resize(if interval { 3 } else { 1 }, String::new());
+        fields
+    }
+}
+
+impl Table {
+    pub fn new(id: &str, title: &str, heads: usize, columns: Vec<Column>) -> Table {
+        Table { id: id.into(), title: title.into(), caption: String::new(), columns, heads, rows: Vec::new() }
+    }
+
+    pub fn csv(&self) -> String {
+        let mut heading = Vec::new();
+        for c in &self.columns {
+            let unit = if c.unit.is_empty() { String::new() } else { format!(" ({})", c.unit) };
+            heading.push(format!("{}{unit}", c.name));
+            if c.interval {
+                heading.push(format!("{} low{unit}", c.name));
+                heading.push(format!("{} high{unit}", c.name));
+            }
+        }
+        let mut out = csv_line(&heading);
+        for row in &self.rows {
+            let fields: Vec<String> =
+                row.iter().zip(&self.columns).flat_map(|(cell, c)| cell.raw(c.interval)).collect();
+            out += &csv_line(&fields);
+        }
+        out
+    }
+
+    pub fn markdown(&self) -> String {
+        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+        let mut out = format!("**{}**\n\n", format::markdown(&self.title));
+        out += &line(self.columns.iter().map(|c| format::markdown(&c.heading())).collect());
+        out += &line(self.columns.iter().map(|c| if c.numeric { "---:".into() } else { ":---".into() }).collect());
+        for row in &self.rows {
+            out += &line(row.iter().map(|c| format::markdown(&c.show())).collect());
+        }
+        if !self.caption.is_empty() {
+            out += &format!("\n{}\n", format::markdown(&self.caption));
+        }
+        out
+    }
+
+    pub fn latex(&self) -> String {
+        let align: String = self.columns.iter().map(|c| if c.numeric { 'r' } else { 'l' }).collect();
+        let line = |cells: Vec<String>| format!("    {} \\\\\n", cells.join(" & "));
+        let mut out = String::from("% needs \\usepackage{booktabs}\n\\begin{table}\n  \\centering\n");
+        out += &format!("  \\caption{{{}}}\n", format::latex(&self.title));
+        out += &format!("  \\label{{tab:{}}}\n  \\begin{{tabular}}{{{align}}}\n    \\toprule\n", self.id);
+        out += &line(self.columns.iter().map(|c| format::latex(&c.heading())).collect());
+        out += "    \\midrule\n";
+        for row in &self.rows {
+            out += &line(row.iter().map(|c| format::latex(&c.show())).collect());
+        }
+        out += "    \\bottomrule\n  \\end{tabular}\n\\end{table}\n";
+        out
+    }
+
+    pub fn html(&self) -> String {
+        let mut out = format!(
+            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-labelledby=\"t-{id}\"><table>\n<caption id=\"t-{id}\">{}</caption>\n<thead><tr>",
+            format::html(&self.title),
+            id = self.id,
+        );
+        for c in &self.columns {
+            let about =
+                if c.about.is_empty() { String::new() } else { format!(" title=\"{}\"", format::html(&c.about)) };
+            let class = if c.numeric { " class=\"n\"" } else { "" };
+            let unit = if c.unit.is_empty() {
+                String::new()
+            } else {
+                format!(" <span class=\"unit\">{}</span>", format::html(&c.unit))
+            };
+            out += &format!("<th scope=\"col\"{class}{about}>{}{unit}</th>", format::html(&c.name));
+        }
+        out += "</tr></thead>\n<tbody>\n";
+        for row in &self.rows {
+            out += "<tr>";
+            for (i, (cell, c)) in row.iter().zip(&self.columns).enumerate() {
+                let text = html_cell(cell);
+                let class = if c.numeric { " class=\"n\"" } else { "" };
+                out += &if i < self.heads {
+                    format!("<th scope=\"row\">{text}</th>")
+                } else {
+                    format!("<td{class}>{text}</td>")
+                };
+            }
+            out += "</tr>\n";
+        }
+        out += "</tbody></table></div>\n";
+        if !self.caption.is_empty() {
+            out += &format!("<p class=\"note\">{}</p>\n", format::html(&self.caption));
+        }
+        out
+    }
+
+    /// Columns padded with spaces, for a terminal.
+    pub fn terminal(&self) -> String {
+        let mut lines = vec![self.columns.iter().map(Column::heading).collect::<Vec<_>>()];
+        lines.extend(self.rows.iter().map(|r| r.iter().map(Cell::show).collect()));
+        let width = |c: usize| lines.iter().map(|l| l[c].chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
+        let mut out = String::new();
+        for (i, line) in lines.iter().enumerate() {
+            let cells = line.iter().zip(&widths).zip(&self.columns).map(|((text, w), c)| {
+                let pad = " ".repeat(w - text.chars().count());
+                if c.numeric { format!("{pad}{text}") } else { format!("{text}{pad}") }
+            });
+            out += cells.collect::<Vec<_>>().join("  ").trim_end();
+            out.push('\n');
+            if i == 0 {
+                out += &widths.iter().map(|w| "─".repeat(*w)).collect::<Vec<_>>().join("  ");
+                out.push('\n');
+            }
+        }
+        out
+    }
+}
+
+fn html_cell(cell: &Cell) -> String {
+    match cell {
+        Cell::Status(s) => format!("<span class=\"s {0}\">{0}</span>", status_word(*s)),
+        Cell::Interval(v, low, high) if low != high => format!(
+            "{} <span class=\"ci\">[{}, {}]</span>",
+            format::number(*v, 3),
+            format::number(*low, 3),
+            format::number(*high, 3)
+        ),
+        other => format::html(&other.show()),
+    }
+}
+
+fn csv_line(fields: &[String]) -> String {
+    let escaped: Vec<String> = fields.iter().map(|f| format::csv(f)).collect();
+    escaped.join(",") + "\n"
+}

@@ -1,0 +1,333 @@
+//! Jobs are leased, renewed, given back and accepted once. Every lease raises the
+//! job's epoch; whoever comes back with an older one is fenced off, so that an
+//! attempt may execute twice but counts once.
+
+use super::{Store, now_ms, owner};
+use crate::error::{Error, Result};
+use crate::record::RunSpec;
+use serde::{Deserialize, Serialize};
+use sqlx::{Sqlite, Transaction};
+use std::time::Duration;
+
+/// A lease not renewed for so long is up for grabs.
+pub const LEASE: Duration = Duration::from_secs(30);
+
+/// Attempts lost with their worker (killed, machine gone) before a job counts as failed.
+const LOST_LIMIT: i64 = 5;
+
+/// Crashes before a job counts as failed: one may be another's fault (the
+/// system's memory killer), two are its own.
+const CRASH_LIMIT: i64 = 2;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// On the measuring lane, one at a time.
+    Trial,
+    /// Anywhere else.
+    Judge,
+}
+
+/// What is to be done: identity within the queue.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Job {
+    pub id: i64,
+    pub kind: Kind,
+    /// A measurement (trial) or a judgement (judge).
+    pub target: String,
+    pub repeat: u32,
+    /// 1 for the second take of a noisy repeat.
+    pub take: u32,
+}
+
+/// The right to do a job until it runs out or is renewed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lease {
+    pub job: Job,
+    pub epoch: i64,
+    pub spec: RunSpec,
+}
+
+/// How an attempt ended without a result.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// The program named an error: trying again would only repeat it.
+    Refused(String),
+    TimedOut(String),
+    /// Died without a word; tried once more.
+    Crashed(String),
+}
+
+/// Jobs that wait or are under way.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Left {
+    pub trials: i64,
+    pub judgements: i64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Accepted {
+    Yes,
+    /// The lease had passed to another, who alone counts.
+    Fenced,
+}
+
+const CLAIM_TRIAL: &str = "UPDATE jobs SET state = 'leased', owner = $2, epoch = epoch + 1, attempts = attempts + 1, \
+    lease_until_ms = $3 WHERE id = (SELECT j.id FROM jobs j WHERE j.kind = 'trial' AND j.state = 'queued' AND EXISTS \
+    (SELECT 1 FROM study_runs r WHERE r.measurement_id = j.target AND r.study_id = $1) ORDER BY j.order_key LIMIT 1) \
+    RETURNING id, target, repeat_index, take, epoch";
+
+/// While one worker computes a truth, another judgement that needs the same one
+/// would compute it twice: it waits until somebody has finished with that truth.
+const CLAIM_JUDGE: &str = "UPDATE jobs SET state = 'leased', owner = $2, epoch = epoch + 1, attempts = attempts + 1, \
+    lease_until_ms = $3 WHERE id = (SELECT j.id FROM jobs j WHERE j.kind = 'judge' AND j.state = 'queued' AND EXISTS \
+    (SELECT 1 FROM study_runs r WHERE r.judgement_id = j.target AND r.study_id = $1) AND NOT (EXISTS \
+    (SELECT 1 FROM jobs b WHERE b.kind = 'judge' AND b.group_key = j.group_key AND b.state = 'leased') AND NOT EXISTS \
+    (SELECT 1 FROM jobs b WHERE b.kind = 'judge' AND b.group_key = j.group_key AND b.state = 'done')) \
+    ORDER BY j.order_key LIMIT 1) RETURNING id, target, repeat_index, take, epoch";
+
+impl Store {
+    /// Leases the next job of `kind` in `study_id`, if one waits.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn lease(&self, study_id: i64, kind: Kind) -> Result<Option<Lease>> {
+        self.lease_for(study_id, kind, LEASE).await
+    }
+
+    /// As [`Store::lease`] with another term.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn lease_for(&self, study_id: i64, kind: Kind, term: Duration) -> Result<Option<Lease>> {
+        let explain = |e: sqlx::Error| self.explain("a lease", &e);
+        let mut tx = self.begin("a lease").await?;
+        reap(&mut tx).await.map_err(explain)?;
+        let (now, me) = (now_ms(), owner::this());
+        let row: Option<(i64, String, i64, i64, i64)> =
+            sqlx::query_as(if kind == Kind::Trial { CLAIM_TRIAL } else { CLAIM_JUDGE })
+                .bind(study_id)
+                .bind(&me)
+                .bind(now + term.as_millis() as i64)
+                .fetch_optional(&mut *tx)
+                .await
+                .map_err(explain)?;
+        let Some((id, target, repeat, take, epoch)) = row else {
+            tx.commit().await.map_err(explain)?;
+            return Ok(None);
+        };
+        sqlx::query("INSERT INTO attempts (job_id, epoch, owner, started_ms) VALUES ($1, $2, $3, $4)")
+            .bind(id)
+            .bind(epoch)
+            .bind(&me)
+            .bind(now)
+            .execute(&mut *tx)
+            .await
+            .map_err(explain)?;
+        let (json,): (String,) = sqlx::query_as(match kind {
+            Kind::Trial => "SELECT spec_json FROM study_runs WHERE study_id = $1 AND measurement_id = $2 LIMIT 1",
+            Kind::Judge => "SELECT spec_json FROM study_runs WHERE study_id = $1 AND judgement_id = $2 LIMIT 1",
+        })
+        .bind(study_id)
+        .bind(&target)
+        .fetch_one(&mut *tx)
+        .await
+        .map_err(explain)?;
+        tx.commit().await.map_err(explain)?;
+        let spec = self.parse(&json, "a run")?;
+        let job = Job { id, kind, target, repeat: repeat as u32, take: take as u32 };
+        Ok(Some(Lease { job, epoch, spec }))
+    }
+
+    /// Renews a lease. False when it has passed to another: stop the work.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn renew(&self, lease: &Lease) -> Result<bool> {
+        let sql = "UPDATE jobs SET lease_until_ms = $3 WHERE id = $1 AND epoch = $2 AND state = 'leased'";
+        let done = sqlx::query(sql)
+            .bind(lease.job.id)
+            .bind(lease.epoch)
+            .bind(now_ms() + LEASE.as_millis() as i64)
+            .execute(&self.writer)
+            .await
+            .map_err(|e| self.explain("a lease", &e))?;
+        Ok(done.rows_affected() == 1)
+    }
+
+    /// Gives a job back undone, as if it had not been taken.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn give_back(&self, lease: &Lease) -> Result<()> {
+        let explain = |e: sqlx::Error| self.explain("a lease", &e);
+        let mut tx = self.begin("a lease").await?;
+        if fence(&mut tx, lease, "queued", None).await.map_err(explain)? {
+            sqlx::query("UPDATE jobs SET attempts = attempts - 1 WHERE id = $1")
+                .bind(lease.job.id)
+                .execute(&mut *tx)
+                .await
+                .map_err(explain)?;
+            end_attempt(&mut tx, lease, "returned", None).await.map_err(explain)?;
+        }
+        tx.commit().await.map_err(explain)
+    }
+
+    /// Returns leases whose holder is known to be dead, and those run out, to the queue.
+    /// The number of jobs returned.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn return_orphans(&self) -> Result<u64> {
+        let explain = |e: sqlx::Error| self.explain("the leases", &e);
+        let mut tx = self.begin("the leases").await?;
+        let leased: Vec<(i64, String)> = sqlx::query_as("SELECT id, owner FROM jobs WHERE state = 'leased'")
+            .fetch_all(&mut *tx)
+            .await
+            .map_err(explain)?;
+        for (id, owner) in leased {
+            if owner::is_dead(&owner) {
+                sqlx::query("UPDATE jobs SET lease_until_ms = 0 WHERE id = $1")
+                    .bind(id)
+                    .execute(&mut *tx)
+                    .await
+                    .map_err(explain)?;
+            }
+        }
+        let returned = reap(&mut tx).await.map_err(explain)?;
+        tx.commit().await.map_err(explain)?;
+        Ok(returned)
+    }
+
+    /// Ends a lease without a result. True when the job is now failed for good.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn fail(&self, lease: &Lease, outcome: &Outcome) -> Result<bool> {
+        let explain = |e: sqlx::Error| self.explain("a failure", &e);
+        let (name, reason) = match outcome {
+            Outcome::Refused(r) => ("refused", r),
+            Outcome::TimedOut(r) => ("timed_out", r),
+            Outcome::Crashed(r) => ("crashed", r),
+        };
+        let mut tx = self.begin("a failure").await?;
+        let (crashes,): (i64,) =
+            sqlx::query_as("SELECT count(*) FROM attempts WHERE job_id = $1 AND outcome = 'crashed'")
+                .bind(lease.job.id)
+                .fetch_one(&mut *tx)
+                .await
+                .map_err(explain)?;
+        let last = name != "crashed" || crashes + 1 >= CRASH_LIMIT;
+        let reason = if name == "crashed" && last {
+            format!("{reason} (attempt {} of it)", crashes + 1)
+        } else {
+            reason.clone()
+        };
+        let held =
+            fence(&mut tx, lease, if last { "failed" } else { "queued" }, Some(&reason)).await.map_err(explain)?;
+        end_attempt(&mut tx, lease, if held { name } else { "fenced" }, Some(&reason)).await.map_err(explain)?;
+        tx.commit().await.map_err(explain)?;
+        Ok(held && last)
+    }
+
+    /// Jobs of the study that wait or are under way.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn jobs_left(&self, study_id: i64) -> Result<Left> {
+        let (trials, judgements): (i64, i64) = sqlx::query_as(
+            "SELECT coalesce(sum(j.kind = 'trial'), 0), coalesce(sum(j.kind = 'judge'), 0) FROM jobs j \
+             WHERE j.state IN ('queued', 'leased') AND \
+             ((j.kind = 'trial' AND j.target IN (SELECT measurement_id FROM study_runs WHERE study_id = $1)) OR \
+             (j.kind = 'judge' AND j.target IN (SELECT judgement_id FROM study_runs WHERE study_id = $1)))",
+        )
+        .bind(study_id)
+        .fetch_one(&self.writer)
+        .await
+        .map_err(|e| self.explain("reading the queue", &e))?;
+        Ok(Left { trials, judgements })
+    }
+
+    /// Whether a trial of the study waits.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn has_queued_trial(&self, study_id: i64) -> Result<bool> {
+        sqlx::query_scalar(
+            "SELECT EXISTS (SELECT 1 FROM jobs j WHERE j.kind = 'trial' AND j.state = 'queued' AND EXISTS \
+             (SELECT 1 FROM study_runs r WHERE r.measurement_id = j.target AND r.study_id = $1))",
+        )
+        .bind(study_id)
+        .fetch_one(&self.writer)
+        .await
+        .map_err(|e| self.explain("reading the queue", &e))
+    }
+
+    pub(super) fn parse<T: for<'a> Deserialize<'a>>(&self, json: &str, what: &str) -> Result<T> {
+        serde_json::from_str(json).map_err(|e| {
+            Error::new(format!("{what} in the database cannot be read: {e}"))
+                .in_file(&self.path)
+                .help("another version of cullmark may have written it; use that one, or another file with --db")
+        })
+    }
+}
+
+/// Leases that ran out go back to the queue, or fail when lost too often.
+async fn reap(tx: &mut Transaction<'_, Sqlite>) -> sqlx::Result<u64> {
+    let expired: Vec<(i64, i64)> =
+        sqlx::query_as("SELECT id, epoch FROM jobs WHERE state = 'leased' AND lease_until_ms < $1")
+            .bind(now_ms())
+            .fetch_all(&mut **tx)
+            .await?;
+    for (id, epoch) in &expired {
+        sqlx::query(
+            "UPDATE attempts SET outcome = 'lost', ended_ms = $3 WHERE job_id = $1 AND epoch = $2 AND outcome IS NULL",
+        )
+        .bind(id)
+        .bind(epoch)
+        .bind(now_ms())
+        .execute(&mut **tx)
+        .await?;
+        sqlx::query(
+            "UPDATE jobs SET state = CASE WHEN attempts >= $2 THEN 'failed' ELSE 'queued' END, \
+             reason = CASE WHEN attempts >= $2 THEN 'its worker was lost ' || attempts || ' times' ELSE reason END, \
+             owner = NULL WHERE id = $1",
+        )
+        .bind(id)
+        .bind(LOST_LIMIT)
+        .execute(&mut **tx)
+        .await?;
+    }
+    Ok(expired.len() as u64)
+}
+
+/// Moves a leased job on, if the lease is still the latest one.
+pub(super) async fn fence(
+    tx: &mut Transaction<'_, Sqlite>,
+    lease: &Lease,
+    state: &str,
+    reason: Option<&str>,
+) -> sqlx::Result<bool> {
+    let sql = "UPDATE jobs SET state = $3, reason = $4, owner = NULL, lease_until_ms = 0 \
+               WHERE id = $1 AND epoch = $2 AND state = 'leased'";
+    let done =
+        sqlx::query(sql).bind(lease.job.id).bind(lease.epoch).bind(state).bind(reason).execute(&mut **tx).await?;
+    Ok(done.rows_affected() == 1)
+}
+
+pub(super) async fn end_attempt(
+    tx: &mut Transaction<'_, Sqlite>,
+    lease: &Lease,
+    outcome: &str,
+    detail: Option<&str>,
+) -> sqlx::Result<()> {
+    sqlx::query("UPDATE attempts SET ended_ms = $3, outcome = $4, detail = $5 WHERE job_id = $1 AND epoch = $2")
+        .bind(lease.job.id)
+        .bind(lease.epoch)
+        .bind(now_ms())
+        .bind(outcome)
+        .bind(detail)
+        .execute(&mut **tx)
+        .await?;
+    Ok(())
+}

@@ -1,0 +1,360 @@
+//! Results of a study, put together from rows. Medians over trials are computed
+//! here from the stored series, so that nothing derived is stored twice.
+
+use super::fetch::{SeriesRow, TrialRow};
+use super::{Store, blob};
+use crate::error::{Error, Result, did_you_mean};
+use crate::record::{Judgement, RepeatPolicy, RunSpec};
+use crate::results::{Excluded, RunResult, RunStatus, StudyResults, TrialSummary};
+use crate::stats;
+use rayon::prelude::*;
+use serde::Serialize;
+use sqlx::FromRow;
+use std::collections::{BTreeMap, HashMap};
+
+/// How much of each run to read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Detail {
+    /// Statuses, counters, errors and totals of trials: for tables and filters.
+    Summary,
+    /// Also the numbers of every frame: for charts.
+    Frames,
+}
+
+/// A line of the list of studies.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StudyInfo {
+    pub id: i64,
+    pub name: String,
+    pub series: u32,
+    pub title: String,
+    pub created_utc: String,
+    pub runs: u64,
+    pub done: u64,
+}
+
+/// What is known of a measurement: for `plan`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnownRun {
+    pub status: RunStatus,
+    pub reason: Option<String>,
+    pub repeats: u32,
+    /// Median wall time of a trial's process; none before the first.
+    pub trial_wall_ns: Option<f64>,
+}
+
+#[derive(FromRow)]
+pub(super) struct StudyRow {
+    pub id: i64,
+    name: String,
+    title: String,
+    manifest_toml: String,
+    claims_json: String,
+    policy_json: String,
+    consolidate_frames: i64,
+    machine_class: String,
+    created_ms: i64,
+}
+
+#[derive(FromRow)]
+struct RunRow {
+    measurement_id: String,
+    judgement_id: String,
+    spec_json: String,
+    structure_label: String,
+    culling_label: String,
+    walk_label: String,
+    answer_id: String,
+    machine_class: String,
+    status: String,
+    reason: Option<String>,
+    stop_reason: Option<String>,
+}
+
+pub(super) fn status_of(text: &str) -> RunStatus {
+    match text {
+        "done" => RunStatus::Done,
+        "failed" => RunStatus::Failed,
+        "wrong" => RunStatus::Wrong,
+        _ => RunStatus::Pending,
+    }
+}
+
+impl Store {
+    /// All studies, the latest first.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn studies(&self) -> Result<Vec<StudyInfo>> {
+        type Row = (i64, String, i64, String, i64, i64, i64);
+        let rows: Vec<Row> = sqlx::query_as(
+            "SELECT s.id, s.name, s.series, s.title, s.created_ms, count(r.ordinal), \
+             coalesce(sum(m.status = 'done'), 0) FROM studies s LEFT JOIN study_runs r ON r.study_id = s.id \
+             LEFT JOIN measurements m ON m.measurement_id = r.measurement_id GROUP BY s.id ORDER BY s.submitted_ms DESC, s.id DESC",
+        )
+        .fetch_all(&self.readers)
+        .await
+        .map_err(|e| self.explain("reading the studies", &e))?;
+        let info = |(id, name, series, title, created, runs, done): Row| StudyInfo {
+            id,
+            name,
+            series: series as u32,
+            title,
+            created_utc: utc(created),
+            runs: runs as u64,
+            done: done as u64,
+        };
+        Ok(rows.into_iter().map(info).collect())
+    }
+
+    /// Everything of `study`: a name (its latest series) or `name@series`.
+    ///
+    /// # Errors
+    /// When there is no such study, a row cannot be read or the database fails.
+    pub async fn results(&self, study: &str) -> Result<StudyResults> {
+        self.results_with(study, Detail::Frames).await
+    }
+
+    /// As [`Store::results`], with or without the numbers of every frame.
+    ///
+    /// # Errors
+    /// As [`Store::results`].
+    pub async fn results_with(&self, study: &str, detail: Detail) -> Result<StudyResults> {
+        let explain = |e: sqlx::Error| self.explain("reading the study", &e);
+        let study = self.find(study).await?;
+        let rows: Vec<RunRow> = sqlx::query_as(
+            "SELECT r.measurement_id, r.judgement_id, r.spec_json, r.structure_label, r.culling_label, r.walk_label, \
+             m.answer_id, m.machine_class, m.status, m.reason, m.stop_reason FROM study_runs r \
+             JOIN measurements m ON m.measurement_id = r.measurement_id WHERE r.study_id = $1 ORDER BY r.ordinal",
+        )
+        .bind(study.id)
+        .fetch_all(&self.readers)
+        .await
+        .map_err(explain)?;
+        let trials = self.trials_of(study.id).await?;
+        let counters = self.counters_of(study.id).await?;
+        let judgements = self.judgements_of(study.id).await?;
+        let series = if detail == Detail::Frames { self.series_of(study.id).await? } else { HashMap::new() };
+        let runs = rows
+            .par_iter()
+            .map(|row| {
+                let id = row.measurement_id.as_str();
+                self.run_of(
+                    row,
+                    trials.get(id).map_or(&[][..], Vec::as_slice),
+                    series.get(id).map_or(&[][..], Vec::as_slice),
+                    counters.get(id),
+                    judgements.get(&row.judgement_id),
+                )
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let excluded: Vec<(String, String, i64)> =
+            sqlx::query_as("SELECT cell, why, cells FROM excluded WHERE study_id = $1 ORDER BY ordinal")
+                .bind(study.id)
+                .fetch_all(&self.readers)
+                .await
+                .map_err(explain)?;
+        Ok(StudyResults {
+            name: study.name,
+            title: study.title,
+            manifest_toml: study.manifest_toml,
+            created_utc: utc(study.created_ms),
+            runs,
+            excluded: excluded
+                .into_iter()
+                .map(|(cell, why, count)| Excluded { cell, why, count: count as u64 })
+                .collect(),
+            environments: self.environments_of(study.id).await?,
+            consolidate_frames: study.consolidate_frames as u32,
+        })
+    }
+
+    /// The claims of a study, as the JSON that was submitted.
+    ///
+    /// # Errors
+    /// When there is no such study or the database fails.
+    pub async fn claims_json(&self, study: &str) -> Result<String> {
+        Ok(self.find(study).await?.claims_json)
+    }
+
+    /// How a study is repeated, and on which class of machine.
+    ///
+    /// # Errors
+    /// When there is no such study or the database fails.
+    pub async fn policy(&self, study: &str) -> Result<(RepeatPolicy, String)> {
+        let row = self.find(study).await?;
+        Ok((self.parse(&row.policy_json, "a policy")?, row.machine_class))
+    }
+
+    /// What is known of each of `ids`; those never seen are left out. For plans.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn known_runs(&self, ids: &[String]) -> Result<HashMap<String, KnownRun>> {
+        let mut out = HashMap::new();
+        for chunk in ids.chunks(1000) {
+            let mut q = sqlx::QueryBuilder::<sqlx::Sqlite>::new(
+                "SELECT m.measurement_id, m.status, m.reason, m.repeats, t.wall_ns FROM measurements m \
+                 LEFT JOIN trials t ON t.measurement_id = m.measurement_id WHERE m.measurement_id IN (",
+            );
+            let mut list = q.separated(", ");
+            for id in chunk {
+                list.push_bind(id.clone());
+            }
+            q.push(")");
+            type Row = (String, String, Option<String>, i64, Option<i64>);
+            let rows: Vec<Row> = q
+                .build_query_as()
+                .fetch_all(&self.readers)
+                .await
+                .map_err(|e| self.explain("reading what is done", &e))?;
+            let mut walls: HashMap<String, Vec<f64>> = HashMap::new();
+            for (id, status, reason, repeats, wall) in rows {
+                walls.entry(id.clone()).or_default().extend(wall.map(|w| w as f64));
+                let known =
+                    KnownRun { status: status_of(&status), reason, repeats: repeats as u32, trial_wall_ns: None };
+                out.insert(id, known);
+            }
+            for (id, walls) in walls.into_iter().filter(|(_, w)| !w.is_empty()) {
+                out.get_mut(&id).expect("inserted above").trial_wall_ns = Some(stats::median(&walls));
+            }
+        }
+        Ok(out)
+    }
+
+    /// The cells of a stored study as they were submitted, to tell what changed.
+    ///
+    /// # Errors
+    /// When there is no such study or the database fails.
+    pub async fn specs(&self, study: &str) -> Result<Vec<RunSpec>> {
+        let study = self.find(study).await?;
+        let rows: Vec<String> =
+            sqlx::query_scalar("SELECT spec_json FROM study_runs WHERE study_id = $1 ORDER BY ordinal")
+                .bind(study.id)
+                .fetch_all(&self.readers)
+                .await
+                .map_err(|e| self.explain("reading the study", &e))?;
+        rows.par_iter().map(|json| self.parse(json, "a run")).collect()
+    }
+
+    pub(super) async fn find(&self, study: &str) -> Result<StudyRow> {
+        let (name, series) = match study.rsplit_once('@') {
+            Some((name, n)) if n.parse::<i64>().is_ok() => (name, n.parse::<i64>().ok()),
+            _ => (study, None),
+        };
+        let row: Option<StudyRow> = sqlx::query_as(
+            "SELECT id, name, title, manifest_toml, claims_json, policy_json, consolidate_frames, machine_class, \
+             created_ms FROM studies WHERE (name = $1 AND $2 IS NULL) OR (name = $3 AND series = $2) \
+             ORDER BY series DESC LIMIT 1",
+        )
+        .bind(study)
+        .bind(series)
+        .bind(name)
+        .fetch_optional(&self.readers)
+        .await
+        .map_err(|e| self.explain("reading the studies", &e))?;
+        if let Some(row) = row {
+            return Ok(row);
+        }
+        let all = self.studies().await?;
+        let names: Vec<String> = all.iter().map(|s| format!("{}@{}", s.name, s.series)).collect();
+        let near = did_you_mean(name, all.iter().map(|s| s.name.as_str()));
+        let help = match near {
+            Some(near) if near != name => format!("did you mean `{near}`?"),
+            _ if names.is_empty() => "it holds no study yet: `cullmark run experiments/quick.toml`".to_string(),
+            _ => format!("it holds: {}", names.join(", ")),
+        };
+        Err(Error::new(format!("there is no study `{study}` in the database")).in_file(&self.path).help(help))
+    }
+
+    fn run_of(
+        &self,
+        row: &RunRow,
+        trials: &[TrialRow],
+        series: &[SeriesRow],
+        counters: Option<&BTreeMap<String, f64>>,
+        judgement: Option<&Judgement>,
+    ) -> Result<RunResult> {
+        let mut status = status_of(&row.status);
+        let mut reason = row.reason.clone();
+        // Another study may have judged the same answer more strictly, or this one not yet.
+        if let Some(wrong) = judgement.and_then(|j| j.wrong.clone()) {
+            (status, reason) = (RunStatus::Wrong, Some(wrong));
+        } else if status == RunStatus::Done && !row.judgement_id.is_empty() && judgement.is_none() {
+            status = RunStatus::Pending;
+        }
+        let best: Vec<&TrialRow> = trials
+            .iter()
+            .filter(|t| !trials.iter().any(|o| o.repeat_index == t.repeat_index && o.take > t.take))
+            .filter(|_| status == RunStatus::Done)
+            .collect();
+        let decode = |s: &SeriesRow| blob::decode(&s.data).map_err(|e| e.in_file(&self.path).key(&row.measurement_id));
+        let counted = |name: &str| match series.iter().find(|s| s.repeat_index == -1 && s.name == name) {
+            Some(s) => decode(s),
+            None => Ok(Vec::new()),
+        };
+        let mut trial_cull_ns = Vec::new();
+        for t in &best {
+            let times =
+                series.iter().find(|s| s.repeat_index == t.repeat_index && s.take == t.take && s.name == "cull_ns");
+            if let Some(times) = times {
+                trial_cull_ns.push(decode(times)?);
+            }
+        }
+        Ok(RunResult {
+            measurement_id: row.measurement_id.clone(),
+            answer_id: row.answer_id.clone(),
+            spec: self.parse(&row.spec_json, "a run")?,
+            structure: row.structure_label.clone(),
+            culling: row.culling_label.clone(),
+            walk: row.walk_label.clone(),
+            status,
+            reason,
+            stop_reason: row.stop_reason.clone(),
+            class: judgement.map(|j| j.class),
+            machine_class: row.machine_class.clone(),
+            trials: best.iter().map(|t| summary(t)).collect(),
+            cull_ns: median_by_frame(&trial_cull_ns),
+            triangles: counted("triangles")?,
+            draw_calls: counted("draw_calls")?,
+            nodes_visited: counted("nodes_visited")?,
+            trial_cull_ns,
+            counters: counters.cloned().unwrap_or_default(),
+            errors: judgement.map_or_else(Vec::new, |j| j.frames.clone()),
+        })
+    }
+}
+
+fn summary(t: &TrialRow) -> TrialSummary {
+    TrialSummary {
+        repeat: t.repeat_index as u32,
+        total_cull_ns: t.total_cull_ns,
+        build_ns: t.build_ns as f64,
+        prepare_ns: t.prepare_ns as f64,
+        load_ns: t.load_ns as f64,
+        peak_rss_bytes: t.peak_rss_bytes as f64,
+        noise: t.noise,
+        noisy: t.noisy != 0,
+    }
+}
+
+/// Median over trials at each frame; frames that all trials have.
+fn median_by_frame(trials: &[Vec<f64>]) -> Vec<f64> {
+    let frames = trials.iter().map(Vec::len).min().unwrap_or(0);
+    let mut column = Vec::with_capacity(trials.len());
+    (0..frames)
+        .map(|f| {
+            column.clear();
+            column.extend(trials.iter().map(|t| t[f]));
+            stats::median(&column)
+        })
+        .collect()
+}
+
+/// `2026-11-23T10:42:50Z`.
+pub(super) fn utc(ms: i64) -> String {
+    match jiff::Timestamp::from_millisecond(ms) {
+        Ok(t) => t.strftime("%Y-%m-%dT%H:%M:%SZ").to_string(),
+        Err(_) => format!("{ms} ms"),
+    }
+}

@@ -1,0 +1,353 @@
+//! What accepted trials and the judgement make of a measurement: is it done, is
+//! it wrong, did it fail, or does it need another trial? Pure in what is stored,
+//! so that it can be asked again after any interruption.
+
+use super::accept::Work;
+use super::{Store, now_ms, rows};
+use crate::error::Result;
+use crate::record::{RepeatPolicy, RunSpec};
+use crate::results::RunStatus;
+use crate::stats;
+use sqlx::{Sqlite, Transaction};
+
+/// Disturbed repeats taken a second time, a run.
+const RETAKES: usize = 3;
+
+/// State of a measurement after looking at all there is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settled {
+    pub status: RunStatus,
+    pub reason: Option<String>,
+    pub stop_reason: Option<String>,
+    /// Repeats accepted.
+    pub repeats: u32,
+    /// Trials queued because the interval is still wide or a repeat was disturbed.
+    pub trials_added: u32,
+    /// Trials no longer needed because the run failed or is wrong.
+    pub trials_cancelled: u32,
+}
+
+struct Trial {
+    repeat: i64,
+    take: i64,
+    total_ns: f64,
+    work: Work,
+    noisy: bool,
+}
+
+type TrialRow = (i64, i64, f64, String, i64, f64, i64);
+
+impl Store {
+    /// Decides about one measurement and stores the decision.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn settle(&self, study_id: i64, measurement_id: &str, policy: &RepeatPolicy) -> Result<Settled> {
+        let explain = |e: sqlx::Error| self.explain("a decision", &e);
+        let mut tx = self.begin("a decision").await?;
+        let mut settled = self.decide(&mut tx, study_id, measurement_id, policy).await?;
+        settled.trials_cancelled = write(&mut tx, measurement_id, &settled).await.map_err(explain)?;
+        tx.commit().await.map_err(explain)?;
+        Ok(settled)
+    }
+
+    /// Measurements of the study that are not finished; those that wait for `judgement_id` if given.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn unsettled(&self, study_id: i64, judgement_id: Option<&str>) -> Result<Vec<String>> {
+        sqlx::query_scalar(
+            "SELECT m.measurement_id FROM measurements m JOIN study_runs r ON r.measurement_id = m.measurement_id \
+             WHERE r.study_id = $1 AND m.status = 'pending' AND ($2 IS NULL OR m.judgement_id = $2) \
+             GROUP BY m.measurement_id ORDER BY min(r.ordinal)",
+        )
+        .bind(study_id)
+        .bind(judgement_id)
+        .fetch_all(&self.writer)
+        .await
+        .map_err(|e| self.explain("reading the study", &e))
+    }
+
+    /// How the run is called in progress and logs.
+    ///
+    /// # Errors
+    /// When the study has no such run or the database fails.
+    pub async fn label_of(&self, study_id: i64, measurement_id: &str) -> Result<String> {
+        let json: String =
+            sqlx::query_scalar("SELECT spec_json FROM study_runs WHERE study_id = $1 AND measurement_id = $2 LIMIT 1")
+                .bind(study_id)
+                .bind(measurement_id)
+                .fetch_one(&self.writer)
+                .await
+                .map_err(|e| self.explain("reading the study", &e))?;
+        Ok(super::label(&self.parse::<RunSpec>(&json, "a run")?))
+    }
+
+    async fn decide(
+        &self,
+        tx: &mut Transaction<'_, Sqlite>,
+        study_id: i64,
+        measurement_id: &str,
+        policy: &RepeatPolicy,
+    ) -> Result<Settled> {
+        let explain = |e: sqlx::Error| self.explain("a decision", &e);
+        let (answer_id, judgement_id): (String, String) =
+            sqlx::query_as("SELECT answer_id, judgement_id FROM measurements WHERE measurement_id = $1")
+                .bind(measurement_id)
+                .fetch_one(&mut **tx)
+                .await
+                .map_err(explain)?;
+        let rows: Vec<TrialRow> = sqlx::query_as(
+            "SELECT repeat_index, take, total_cull_ns, work_json, noisy, noise, wall_ns FROM trials \
+             WHERE measurement_id = $1 ORDER BY repeat_index, take",
+        )
+        .bind(measurement_id)
+        .fetch_all(&mut **tx)
+        .await
+        .map_err(explain)?;
+        let mut trials = Vec::with_capacity(rows.len());
+        for (repeat, take, total_ns, work, noisy, ..) in rows {
+            trials.push(Trial { repeat, take, total_ns, work: self.parse(&work, "a trial")?, noisy: noisy != 0 });
+        }
+        let repeats = trials.iter().filter(|t| t.take == 0).count() as u32;
+        let pending = Settled {
+            status: RunStatus::Pending,
+            reason: None,
+            stop_reason: None,
+            repeats,
+            trials_added: 0,
+            trials_cancelled: 0,
+        };
+        let end = |status, reason: String| Settled { status, reason: Some(reason), ..pending.clone() };
+
+        let judgement: Option<(Option<String>, String)> =
+            sqlx::query_as("SELECT wrong, frames_hash FROM judgements WHERE judgement_id = $1")
+                .bind(&judgement_id)
+                .fetch_optional(&mut **tx)
+                .await
+                .map_err(explain)?;
+        if let Some((Some(wrong), _)) = &judgement {
+            return Ok(end(RunStatus::Wrong, wrong.clone()));
+        }
+        if let Some(reason) = failed_job(tx, measurement_id, &judgement_id).await.map_err(explain)? {
+            return Ok(end(RunStatus::Failed, reason));
+        }
+        if let Some(reason) = difference(&trials) {
+            return Ok(end(RunStatus::Failed, reason));
+        }
+        let (frames_hash,): (Option<String>,) = sqlx::query_as("SELECT frames_hash FROM answers WHERE answer_id = $1")
+            .bind(&answer_id)
+            .fetch_one(&mut **tx)
+            .await
+            .map_err(explain)?;
+        let judged_hash = judgement.as_ref().map(|(_, hash)| hash);
+        for (whose, hash) in [("the judgement", judged_hash), ("an earlier measurement", frames_hash.as_ref())] {
+            if let (Some(hash), Some(t)) = (hash, trials.first())
+                && *hash != t.work.frames_hash
+            {
+                let reason = format!(
+                    "counters differ between trial {} and {whose}: the hash of the submitted sets is {} and {hash}",
+                    t.repeat, t.work.frames_hash
+                );
+                return Ok(end(RunStatus::Failed, reason));
+            }
+        }
+        if repeats < policy.repeats {
+            return Ok(pending);
+        }
+        if self.waits(tx, measurement_id).await? {
+            return Ok(pending);
+        }
+        let added = self.retakes(tx, study_id, measurement_id, policy, &trials).await?;
+        if added > 0 {
+            return Ok(Settled { trials_added: added, ..pending });
+        }
+        let totals: Vec<f64> = best_takes(&trials).iter().map(|t| t.total_ns).collect();
+        let relative_ci = relative_ci(&totals, policy.seed);
+        let stop_reason = match policy.relative_ci {
+            None => format!("{repeats} repeats as asked"),
+            Some(asked) if relative_ci <= asked => {
+                format!(
+                    "95 % interval {:.2} % of the median after {repeats} repeats (asked: {:.2} %)",
+                    relative_ci * 100.0,
+                    asked * 100.0
+                )
+            }
+            Some(asked) if repeats >= policy.max_repeats => format!(
+                "max_repeats {repeats} reached with a 95 % interval of {:.2} % of the median (asked: {:.2} %)",
+                relative_ci * 100.0,
+                asked * 100.0
+            ),
+            Some(_) => {
+                self.queue_trial(tx, study_id, measurement_id, policy, repeats, 0).await?;
+                return Ok(Settled { trials_added: 1, ..pending });
+            }
+        };
+        sqlx::query("UPDATE measurements SET relative_ci = $2 WHERE measurement_id = $1")
+            .bind(measurement_id)
+            .bind(relative_ci.is_finite().then_some(relative_ci))
+            .execute(&mut **tx)
+            .await
+            .map_err(explain)?;
+        if !judgement_id.is_empty() && judgement.is_none() {
+            return Ok(Settled { stop_reason: Some(stop_reason), ..pending });
+        }
+        let noisy = best_takes(&trials).iter().filter(|t| t.noisy).count();
+        let reason = (noisy > 0).then(|| format!("noisy machine: {noisy} of {repeats} trials were disturbed"));
+        Ok(Settled { status: RunStatus::Done, reason, stop_reason: Some(stop_reason), ..pending })
+    }
+
+    /// Trials queued or under way.
+    async fn waits(&self, tx: &mut Transaction<'_, Sqlite>, measurement_id: &str) -> Result<bool> {
+        let (n,): (i64,) = sqlx::query_as(
+            "SELECT count(*) FROM jobs WHERE kind = 'trial' AND target = $1 AND state IN ('queued', 'leased')",
+        )
+        .bind(measurement_id)
+        .fetch_one(&mut **tx)
+        .await
+        .map_err(|e| self.explain("a decision", &e))?;
+        Ok(n > 0)
+    }
+
+    /// Queues a second take of each disturbed repeat, up to the limit. Both takes stay on record.
+    async fn retakes(
+        &self,
+        tx: &mut Transaction<'_, Sqlite>,
+        study_id: i64,
+        measurement_id: &str,
+        policy: &RepeatPolicy,
+        trials: &[Trial],
+    ) -> Result<u32> {
+        let taken: Vec<i64> = trials.iter().filter(|t| t.take > 0).map(|t| t.repeat).collect();
+        let again = trials.iter().filter(|t| t.take == 0 && t.noisy && !taken.contains(&t.repeat));
+        let mut added = 0;
+        for trial in again.take(RETAKES.saturating_sub(taken.len())) {
+            self.queue_trial(tx, study_id, measurement_id, policy, trial.repeat as u32, 1).await?;
+            added += 1;
+        }
+        Ok(added)
+    }
+
+    async fn queue_trial(
+        &self,
+        tx: &mut Transaction<'_, Sqlite>,
+        study_id: i64,
+        measurement_id: &str,
+        policy: &RepeatPolicy,
+        repeat: u32,
+        take: u32,
+    ) -> Result<()> {
+        let explain = |e: sqlx::Error| self.explain("another trial", &e);
+        let (block,): (i64,) =
+            sqlx::query_as("SELECT block FROM study_runs WHERE study_id = $1 AND measurement_id = $2 LIMIT 1")
+                .bind(study_id)
+                .bind(measurement_id)
+                .fetch_one(&mut **tx)
+                .await
+                .map_err(explain)?;
+        // A second take comes when the block's other repeats are through: the disturbance may have passed.
+        let round = if take == 0 { repeat } else { 0xffff };
+        sqlx::query(
+            "INSERT INTO jobs (kind, target, repeat_index, take, group_key, order_key, state) \
+             VALUES ('trial', $1, $2, $3, '', $4, 'queued') ON CONFLICT (kind, target, repeat_index, take) \
+             DO UPDATE SET state = 'queued' WHERE jobs.state = 'cancelled'",
+        )
+        .bind(measurement_id)
+        .bind(i64::from(repeat))
+        .bind(i64::from(take))
+        .bind(rows::trial_order(block, round, policy.seed, measurement_id))
+        .execute(&mut **tx)
+        .await
+        .map_err(explain)?;
+        Ok(())
+    }
+}
+
+/// The second take of a repeat replaces the first.
+fn best_takes(trials: &[Trial]) -> Vec<&Trial> {
+    let later = |t: &Trial| trials.iter().any(|o| o.repeat == t.repeat && o.take > t.take);
+    trials.iter().filter(|t| !later(t)).collect()
+}
+
+/// Width of the 95 % bootstrap interval of the median total over that median.
+/// Fewer than three trials say nothing.
+fn relative_ci(totals: &[f64], seed: u64) -> f64 {
+    if totals.len() < 3 {
+        return f64::INFINITY;
+    }
+    let (low, high) = stats::bootstrap_ci_median(totals, stats::RESAMPLES, seed);
+    (high - low) / stats::median(totals)
+}
+
+/// The first disagreement between trials, in words.
+fn difference(trials: &[Trial]) -> Option<String> {
+    let (first, rest) = trials.split_first()?;
+    let other = rest.iter().find(|t| t.work != first.work)?;
+    let (a, b) = (&first.work, &other.work);
+    let counter = a.counters.iter().find(|(name, v)| b.counters.get(*name) != Some(v));
+    let series = a.series.iter().find(|(name, v)| b.series.get(*name) != Some(v));
+    let what = match (counter, series) {
+        (Some((name, v)), _) => match b.counters.get(name) {
+            Some(w) => format!("{name} is {v} and {w}"),
+            None => format!("{name} is {v} and absent"),
+        },
+        (None, Some((name, _))) => format!("`{name}` differs at some frame though its sum does not"),
+        (None, None) if a.frames_hash != b.frames_hash => {
+            format!("the hash of the submitted sets is {} and {}", a.frames_hash, b.frames_hash)
+        }
+        (None, None) => "one of them counted more things".to_string(),
+    };
+    Some(format!("counters differ between trials {} and {}: {what}", first.repeat, other.repeat))
+}
+
+async fn failed_job(
+    tx: &mut Transaction<'_, Sqlite>,
+    measurement_id: &str,
+    judgement_id: &str,
+) -> sqlx::Result<Option<String>> {
+    let row: Option<(String, i64, Option<String>)> = sqlx::query_as(
+        "SELECT kind, repeat_index, reason FROM jobs WHERE state = 'failed' AND ((kind = 'trial' AND target = $1) OR \
+         (kind = 'judge' AND target = $2)) ORDER BY kind, repeat_index LIMIT 1",
+    )
+    .bind(measurement_id)
+    .bind(judgement_id)
+    .fetch_optional(&mut **tx)
+    .await?;
+    Ok(row.map(|(kind, repeat, reason)| {
+        let what = if kind == "judge" { "judging".to_string() } else { format!("trial {repeat}") };
+        format!("{what}: {}", reason.unwrap_or_else(|| "no reason is known".to_string()))
+    }))
+}
+
+async fn write(tx: &mut Transaction<'_, Sqlite>, measurement_id: &str, s: &Settled) -> sqlx::Result<u32> {
+    let status = match s.status {
+        RunStatus::Pending => "pending",
+        RunStatus::Done => "done",
+        RunStatus::Failed => "failed",
+        RunStatus::Wrong => "wrong",
+    };
+    let finished = (s.status != RunStatus::Pending).then(now_ms);
+    sqlx::query(
+        "UPDATE measurements SET status = $2, reason = $3, stop_reason = $4, repeats = $5, finished_ms = $6 \
+         WHERE measurement_id = $1",
+    )
+    .bind(measurement_id)
+    .bind(status)
+    .bind(&s.reason)
+    .bind(&s.stop_reason)
+    .bind(i64::from(s.repeats))
+    .bind(finished)
+    .execute(&mut **tx)
+    .await?;
+    if matches!(s.status, RunStatus::Failed | RunStatus::Wrong) {
+        // Times of a run that is not right would be withheld: do not measure them.
+        let cancelled = sqlx::query(
+            "UPDATE jobs SET state = 'cancelled' WHERE kind = 'trial' AND target = $1 AND state = 'queued'",
+        )
+        .bind(measurement_id)
+        .execute(&mut **tx)
+        .await?;
+        return Ok(cancelled.rows_affected() as u32);
+    }
+    Ok(0)
+}

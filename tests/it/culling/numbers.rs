@@ -1,0 +1,180 @@
+//! Floating point: fact B5, the error bound and what happens far from the origin.
+
+use super::build::{Rng, blocks, camera, view_along};
+use cullmark::culling::frustum::kernels;
+use cullmark::culling::frustum_planes::FramePlanes;
+use cullmark::culling::frustum_scalar::{relative, value};
+use cullmark::hierarchy::BoundsBlock;
+use cullmark::math::{Aabb, Box32, Camera, DVec3, Pose, Vec3, View};
+
+const U: f64 = 1.0 / (1u32 << 24) as f64;
+
+/// B5.1: the error of a plane value, measured in units of `u S`, stays below 7, and
+/// that of the whole test below its guard.
+#[test]
+fn the_evaluation_error_stays_within_the_proved_bound() {
+    let mut rng = Rng::new(41);
+    let (mut worst, mut worst_of_guard) = (0f64, 0f64);
+    for round in 0..400 {
+        let reach = 10f64.powi(round % 7 - 1);
+        let view = View::new(&Camera { far_m: Some(reach), ..camera(75.0, 1.7) }, &rng.pose(reach));
+        let frame = FramePlanes::new(&view, DVec3::ZERO);
+        for _ in 0..50 {
+            let (a, b) = (rng.cube(reach).as_vec3(), rng.cube(reach).as_vec3());
+            let mut block = BoundsBlock::EMPTY;
+            block.set(0, Box32 { lo: a.min(b), hi: a.max(b) });
+            let (corners, guard) = relative(&frame, &block, 0);
+            for (plane, exact_plane) in frame.planes.iter().zip(&view.planes) {
+                let corner = |axis: usize| {
+                    let bound = if plane.p[axis] >= 3 { block.hi[axis][0] } else { block.lo[axis][0] };
+                    f64::from(bound) - view.eye[axis]
+                };
+                let p = DVec3::new(corner(0), corner(1), corner(2));
+                let exact = exact_plane.normal.dot(p) + exact_plane.offset_m;
+                let s = exact_plane.normal.abs().dot(p.abs()) + exact_plane.offset_m.abs();
+                let got = f64::from(value(plane, &corners, &plane.p, plane.d_out));
+                worst = worst.max((got - exact).abs() / (U * s));
+                // Outside is decided by `got < -guard`: `exact <= got + guard` makes that a proof.
+                worst_of_guard = worst_of_guard.max((exact - got) / f64::from(guard));
+            }
+        }
+    }
+    println!("worst error {worst:.2} u S; worst share of the guard {worst_of_guard:.3}");
+    assert!(worst <= 7.0, "{worst} u S");
+    assert!(worst_of_guard < 1.0 && worst_of_guard > 0.02, "{worst_of_guard} of the guard");
+}
+
+/// A visible box: its centre is in the frustum, in f64. Sides 0.1 to 2 m.
+fn visible_boxes(rng: &mut Rng, view: &View, count: usize) -> Vec<Aabb> {
+    let mut boxes = Vec::with_capacity(count);
+    while boxes.len() < count {
+        let depth = rng.range(1.0, 100.0);
+        // Near the rim, where boxes are lost.
+        let (x, y) = (rng.range(-1.05, 1.05) * view.half_width, rng.range(-1.05, 1.05) * view.half_height);
+        let c = view.eye + (view.forward + view.right * x + view.up * y) * depth;
+        let h = DVec3::new(rng.range(0.05, 1.0), rng.range(0.05, 1.0), rng.range(0.05, 1.0));
+        let b = Aabb { lo: c - h, hi: c + h };
+        if nearest_to_outside(view, &b) > 1e-6 {
+            boxes.push(b);
+        }
+    }
+    boxes
+}
+
+/// Smallest p-vertex distance in f64: positive means that the exact test keeps the box.
+fn nearest_to_outside(view: &View, b: &Aabb) -> f64 {
+    view.planes
+        .iter()
+        .map(|p| {
+            let corner = DVec3::select(p.normal.cmpge(DVec3::ZERO), b.hi, b.lo);
+            p.normal.dot(corner - view.eye) + p.offset_m
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Planes as a naive engine has them: from the f32 matrix of the whole world
+/// (Gribb & Hartmann), rows r3 + r0 and so on, near plane by r2.
+fn naive_planes(view: &View) -> Vec<(Vec3, f32)> {
+    let (r, u, f) = (view.right.as_vec3(), view.up.as_vec3(), view.forward.as_vec3());
+    let eye = view.eye.as_vec3();
+    let scale = |v: Vec3, by: f64| (v / by as f32, -(v / by as f32).dot(eye));
+    let (x, y, w) = (scale(r, view.half_width), scale(u, view.half_height), scale(f, 1.0));
+    let near = view.camera.near_m as f32;
+    let row = |a: (Vec3, f32), sign: f32| {
+        let (n, d) = (w.0 + a.0 * sign, w.1 + a.1 * sign);
+        let length = n.length();
+        (n / length, d / length)
+    };
+    vec![row(x, 1.0), row(x, -1.0), row(y, 1.0), row(y, -1.0), (w.0, w.1 - near)]
+}
+
+/// Share of `boxes` that f32 world planes cull, with a guard of `guard` u S.
+fn naive_culls(planes: &[(Vec3, f32)], boxes: &[Aabb], guard: f32) -> usize {
+    let culls = |b: &Aabb| {
+        let (lo, hi) = (b.lo.as_vec3(), b.hi.as_vec3());
+        planes.iter().any(|(n, d)| {
+            let p = Vec3::select(n.cmpge(Vec3::ZERO), hi, lo);
+            n.dot(p) + d < -guard * U as f32 * (n.abs().dot(p.abs()) + d.abs())
+        })
+    };
+    boxes.iter().filter(|b| culls(b)).count()
+}
+
+fn our_culls(view: &View, origin: DVec3, boxes: &[Aabb]) -> usize {
+    let (bounds, live) = blocks(&boxes.iter().map(|b| b.relative_to(origin)).collect::<Vec<_>>());
+    let mut outside = vec![0u8; bounds.len()];
+    (kernels()[0].flat)(&FramePlanes::new(view, origin), &bounds, &live, &mut outside);
+    outside.iter().zip(&live).map(|(o, l)| (o & l).count_ones() as usize).sum()
+}
+
+/// B5.2: world-space f32 loses visible boxes, ten times more a decade of offset; ours none.
+#[test]
+fn naive_world_space_loses_a_decade_more_each_decade_and_ours_nothing() {
+    let mut rng = Rng::new(42);
+    let count = 30_000;
+    let mut rates = Vec::new();
+    for k in 0..=8 {
+        let offset = DVec3::new(0.7, -0.6, 0.4) * 10f64.powi(k);
+        let mut lost = 0;
+        for _ in 0..10 {
+            let eye = offset + rng.cube(50.0);
+            let view = view_along(eye, rng.direction(), &Camera::default());
+            let boxes = visible_boxes(&mut rng, &view, count / 10);
+            lost += naive_culls(&naive_planes(&view), &boxes, 0.0);
+            for origin in [offset.round(), DVec3::ZERO, -offset.round()] {
+                assert_eq!(our_culls(&view, origin, &boxes), 0, "offset 1e{k}, origin {origin}");
+            }
+        }
+        rates.push(lost as f64 / count as f64);
+    }
+    println!("f32 world-space Gribb-Hartmann, false culls at 10^k: {rates:?}");
+    assert!(rates[..4].iter().all(|r| *r < 1e-4), "{rates:?}");
+    assert!(rates[6] > 1e-4 && rates[7] > 1e-3 && rates[8] > 1e-2, "{rates:?}");
+    assert!(rates[7] > 3.0 * rates[6] && rates[8] > 2.0 * rates[7], "{rates:?}");
+}
+
+/// B5.3: a guard makes world space safe too, and keeps boxes for nothing.
+#[test]
+fn a_world_space_guard_is_safe_but_keeps_boxes_for_nothing() {
+    let mut rng = Rng::new(43);
+    let offset = DVec3::new(0.7, -0.6, 0.4) * 1e6;
+    let (mut extra, mut ours, mut kept) = (0, 0, 0);
+    for _ in 0..20 {
+        let view = view_along(offset + rng.cube(50.0), rng.direction(), &Camera::default());
+        let visible = visible_boxes(&mut rng, &view, 500);
+        // Planes from f64, so that the guard has to cover evaluation and bounds alone.
+        let planes: Vec<_> =
+            view.planes.iter().map(|p| (p.normal.as_vec3(), (p.offset_m - p.normal.dot(view.eye)) as f32)).collect();
+        assert_eq!(naive_culls(&planes, &visible, 16.0), 0);
+        let around: Vec<Aabb> = (0..2000)
+            .map(|_| {
+                let (c, h) = (view.eye + rng.cube(60.0), DVec3::splat(rng.range(0.05, 1.0)));
+                Aabb { lo: c - h, hi: c + h }
+            })
+            .collect();
+        let outside: Vec<Aabb> = around.iter().filter(|b| nearest_to_outside(&view, b) < 0.0).copied().collect();
+        kept += around.len() - outside.len();
+        extra += outside.len() - naive_culls(&planes, &outside, 16.0);
+        ours += outside.len() - our_culls(&view, offset.round(), &outside);
+    }
+    let (extra, ours) = (extra as f64 / kept as f64, ours as f64 / kept as f64);
+    println!("kept for nothing at 10^6: world space with 16 u S {extra:.4}, ours {ours:.6}");
+    assert!((0.02..0.5).contains(&extra), "{extra}");
+    assert!(ours < 1e-3, "{ours}");
+}
+
+/// Boxes that touch a plane from outside within rounding are kept; one step further they are not.
+#[test]
+fn the_guard_is_small() {
+    let view = View::new(&Camera::default(), &Pose { eye: DVec3::ZERO, forward: DVec3::X, up: DVec3::Z });
+    for distance in [1e-3, 1.0, 1e3, 1e6] {
+        let behind = |gap: f64| {
+            let near = view.camera.near_m;
+            let c = DVec3::new(near - gap, 0.0, 0.0);
+            Aabb { lo: c - DVec3::splat(distance) + DVec3::X * 0.0, hi: DVec3::new(c.x, distance, distance) }
+        };
+        assert_eq!(our_culls(&view, DVec3::ZERO, &[behind(0.0)]), 0, "touching, {distance}");
+        let guard = 8.5 * U * (3.0 * distance + 0.3);
+        assert_eq!(our_culls(&view, DVec3::ZERO, &[behind(3.0 * guard)]), 1, "clear, {distance}");
+    }
+}
