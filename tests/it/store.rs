@@ -169,7 +169,11 @@ fn a_study_is_queued_once_interleaved_and_its_results_come_back() {
             leases.push(l);
         }
         // Blocked by scene, and all runs of a repeat before the next repeat.
-        let sorted = { let mut o = order.clone(); o.sort(); o };
+        let sorted = {
+            let mut o = order.clone();
+            o.sort();
+            o
+        };
         assert_eq!(order, sorted);
         for l in &leases {
             store.give_back(l).await.unwrap();
@@ -396,10 +400,7 @@ fn an_export_comes_back_whole_twice_is_once_and_damage_is_found() {
         assert_eq!(there.export("a").await.unwrap(), file, "to the byte");
         assert_eq!(there.submit(&s).await.unwrap().done, 2, "finished there, finished here");
         let id = &a.runs[0].measurement_id;
-        assert_eq!(
-            there.trial_record(id, 1, 0).await.unwrap(),
-            store.trial_record(id, 1, 0).await.unwrap()
-        );
+        assert_eq!(there.trial_record(id, 1, 0).await.unwrap(), store.trial_record(id, 1, 0).await.unwrap());
         for at in [0, 16, 30, file.len() / 2, file.len() - 1] {
             let mut bad = file.clone();
             bad[at] ^= 1;
