@@ -1,11 +1,12 @@
-//! Renders a generated scene to a PNG:
-//! `render_scene SPEC OUT.png [over AZIMUTH ELEVATION | plan | eye X Y Z YAW PITCH | walk FRAME] [cut HEIGHT]`,
+//! Renders a generated scene or a scene file (metres, `up z` unless said) to a PNG:
+//! `render_scene SPEC|FILE OUT.png [over AZIMUTH ELEVATION | plan | eye X Y Z YAW PITCH | walk FRAME] [cut HEIGHT] [up y] [scale S]`,
 //! degrees and metres. `walk` on its own with `plan` or `over` draws the way.
 
 use cullmark::math::{Camera, DVec3, Pose, Projection, View};
 use cullmark::preview::{Style, draw_line, overview, plan, render, write_png};
+use cullmark::record::{SceneSource, SceneSpec, Up, Winding};
 use cullmark::registry::Spec;
-use cullmark::scene::{generate, walkthrough};
+use cullmark::scene::{generate, load, walkthrough};
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -14,11 +15,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Err("usage: render_scene SPEC OUT.png [over AZ EL | plan | eye X Y Z YAW PITCH | walk FRAME]".into());
     };
     let started = Instant::now();
-    let scene = generate::make(&Spec::parse(spec)?)?.0.generate();
-    let (bounds, took) = (scene.bounds(), started.elapsed().as_millis());
-    println!("{}: {} triangles, size {:.1} m, {took} ms", scene.name, scene.len(), bounds.size());
     let number = |i: usize| rest.get(i).and_then(|t| t.parse::<f64>().ok()).ok_or("a number is missing");
     let place = |word: &str| rest.iter().position(|w| w == word);
+    let scene = if std::path::Path::new(spec).exists() {
+        let up = place("up").filter(|i| rest.get(i + 1).is_some_and(|w| w == "y")).map_or(Up::Z, |_| Up::Y);
+        let (source, scale) = (SceneSource::File(spec.into()), place("scale").map_or(Ok(1.0), |i| number(i + 1))?);
+        let (name, winding) = (spec.clone(), Winding::Ccw);
+        load::load(&SceneSpec { name, source, winding, up, scale, weld: false, fingerprint: String::new() })?
+    } else {
+        generate::make(&Spec::parse(spec)?)?.0.generate()
+    };
+    let (bounds, took) = (scene.bounds(), started.elapsed().as_millis());
+    println!("{}: {} triangles, size {:.1} m, {took} ms", scene.name, scene.len(), bounds.size());
     let mut style = Style::default();
     if let Some(i) = place("cut") {
         style.cut_above_m = Some(number(i + 1)?);

@@ -17,7 +17,6 @@ pub(super) enum Roof {
     Saw(f64, usize),
     /// Four sides to a tip.
     Tent(f64),
-    Open,
 }
 
 /// An opening that reaches the floor of a storey: side (0 = -y, 1 = +x, 2 = +y,
@@ -128,7 +127,7 @@ impl House<'_> {
     }
 
     fn wall(&self, k: &mut Kit, side: usize, storey: usize, z: f64) {
-        let (length, depth) = if side % 2 == 0 { (self.width, self.depth) } else { (self.depth, self.width) };
+        let (length, depth) = if side.is_multiple_of(2) { (self.width, self.depth) } else { (self.depth, self.width) };
         let half = length * 0.5;
         let mut holes: Vec<Rect> = Vec::new();
         let mut frames: Vec<(Prop, f64, f64)> = Vec::new();
@@ -155,7 +154,7 @@ impl House<'_> {
         k.b.object();
         k.b.paint(self.wall);
         // Walls of the long sides cover the corners, the others stop short of them.
-        let short = if side % 2 == 0 { 0.0 } else { WALL - 0.05 };
+        let short = if side.is_multiple_of(2) { 0.0 } else { WALL - 0.05 };
         let y = -depth * 0.5;
         k.b.panel(Along::Y, [-half + short, z - 0.02, half - short, top], &holes, y, y + WALL);
         for (prop, u, h) in frames {
@@ -185,7 +184,6 @@ impl House<'_> {
         k.b.object();
         k.b.paint(self.roof_paint);
         match self.roof {
-            Roof::Open => {}
             Roof::Flat => {
                 k.b.block(v3(-hw + 0.1, -hd + 0.1, z - 0.3), v3(hw - 0.1, hd - 0.1, z - 0.02));
                 k.b.paint("trim_parapet");

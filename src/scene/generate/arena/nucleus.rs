@@ -12,7 +12,7 @@ const HALF: f64 = 64.0;
 
 pub(super) fn build(seed: u64) -> Map {
     let ground = Terrain::new(HALF, 128, |x, y| {
-        let cliffs = rim(x, y, 50.0, HALF, 13.0);
+        let cliffs = rim(x, y, 47.0, HALF, 15.0);
         0.4 * hills(seed, x / 17.0, y / 17.0) + cliffs * (1.0 + 0.25 * hills(seed + 9, x / 11.0, y / 11.0))
     });
     let mut k = Kit::new("", seed, ground);
@@ -146,6 +146,43 @@ fn side(k: &mut Kit, team: usize) {
     for i in 0..4 {
         k.set(Prop::Pipe, 33.5, -9.0 + 0.5 * f64::from(i), 0.9 + 0.35 * f64::from(i), 1, 8.0);
     }
+    // A pump house and a store flank the pit; walls give cover between them.
+    House {
+        width: 14.0,
+        depth: 10.0,
+        storeys: 2,
+        height: 3.8,
+        wall: "concrete_pump_house",
+        roof: Roof::Shed(1.6),
+        roof_paint: "metal_roof",
+        doors: &[(0, 0, -3.0, 3.0), (2, 0, 3.0, 1.8), (1, 0, 0.0, 1.8), (0, 1, 3.0, 1.8)],
+        windows: 3.6,
+        ..House::default()
+    }
+    .stand(k, 4.0, 33.0, 0);
+    House {
+        width: 11.0,
+        depth: 8.0,
+        height: 4.0,
+        wall: paint,
+        roof: Roof::Gable(2.0),
+        roof_paint: "rust_sheet_roof",
+        doors: &[(3, 0, 0.0, 3.0), (2, 0, 2.0, 1.8)],
+        windows: 3.2,
+        ..House::default()
+    }
+    .stand(k, 26.0, 31.0, 0);
+    for (x, y, q) in [(15.0, 26.0, 0), (-12.0, 30.0, 1), (-20.0, 34.0, 0), (36.0, 22.0, 1)] {
+        k.at(x, y, 0.0, q, |k| {
+            k.block("concrete_wall", v3(-3.0, -0.25, -1.0), v3(3.0, 0.25, 1.5));
+            k.keep_out(-3.0, -0.5, 3.0, 0.5);
+        });
+    }
+    for (x, y) in [(14.0, 28.5), (-14.0, 33.0), (19.0, 38.0)] {
+        k.crates(x, y, 0.1, 4);
+    }
+    k.barrels(-9.0, 36.0, 0.1, 5);
+    k.put(Prop::WaterTank, 14.5, 37.0, 0.1, 0.3, 2.0);
     // Stairs from the pit's floor up to the rim.
     k.stairs("concrete_steps", v3(9.0, 10.2, -6.9), 0, 8.0, 6.9, 2.6);
     k.flatten(16.8, 8.5, 22.0, 12.0, 0.0, 1.5);

@@ -43,7 +43,7 @@ impl Space {
                 *s |= BAND;
             }
         }
-        space.keep_largest_component();
+        space.keep_best_component();
         if !space.state.iter().any(|s| s & BAND != 0) {
             return Err(Error::new(format!("no free space was found for a walk with {clearance} m clearance"))
                 .help("use a smaller clearance_m or eye_height_m, or check the scene's `scale` and `up`"));
@@ -98,20 +98,22 @@ impl Space {
         self.state.par_chunks_mut(column).zip(self.off.par_chunks_mut(column)).map(count).sum()
     }
 
-    fn keep_largest_component(&mut self) {
+    fn keep_best_component(&mut self) {
         let mut group = vec![0u32; self.state.len()];
-        let (mut best, mut best_size, mut groups) = (0, 0usize, 0);
+        let (mut best, mut best_worth, mut groups) = (0, 0usize, 0);
         let mut pending = Vec::new();
         for start in 0..self.state.len() {
             if self.state[start] & BAND == 0 || group[start] != 0 {
                 continue;
             }
             groups += 1;
-            let mut size = 0;
+            let mut worth = 0;
             pending.push(start);
             group[start] = groups;
             while let Some(at) = pending.pop() {
-                size += 1;
+                // What has roofs was made to be walked in: a valley with houses counts
+                // for more than the wide plateaus round it.
+                worth += if self.state[at] & COVERED != 0 { 9 } else { 1 };
                 for next in self.neighbours(at) {
                     if self.state[next] & BAND != 0 && group[next] == 0 {
                         group[next] = groups;
@@ -119,8 +121,8 @@ impl Space {
                     }
                 }
             }
-            if size > best_size {
-                (best, best_size) = (groups, size);
+            if worth > best_worth {
+                (best, best_worth) = (groups, worth);
             }
         }
         for (s, g) in self.state.iter_mut().zip(&group) {
