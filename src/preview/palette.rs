@@ -52,6 +52,10 @@ pub(super) fn material_colour(scene: &Scene, material: u32) -> DVec3 {
     if let Some((_, _, c)) = known.min() {
         return rgb(*c);
     }
+    // The only material of a scene that names none is a plain warm grey.
+    if material == 0 {
+        return DVec3::new(0.74, 0.71, 0.66);
+    }
     // Steps by the golden angle: neighbours in number are far apart in hue.
     let hue = f64::from(material) * 2.399_963;
     let wave = |shift: f64| 0.62 + 0.16 * libm::cos(hue + shift);

@@ -188,7 +188,8 @@ impl Walker for Walk {
         let mut rng = Random::new(self.seed);
         let space = space::Space::new(scene, clearance, eye)?;
         let eyes = route::stroll(&space, self.frames, speed, &mut rng)?;
-        let poses = look_around(&eyes, speed, self.turn, &mut rng);
+        let target = space.flying.then(|| scene.bounds().centre());
+        let poses = look_around(&eyes, target, speed, self.turn, &mut rng);
         // The cells already prove it; exact arithmetic proves the cells.
         match first_crossing(scene, &poses) {
             None => Ok(poses),
@@ -200,14 +201,14 @@ impl Walker for Walk {
     }
 }
 
-/// Faces along the way with some looking around, turning by no more than `turn` a frame.
-fn look_around(eyes: &[DVec3], speed: f64, turn: f64, rng: &mut Random) -> Vec<Pose> {
+/// Faces along the way, or a target, with some looking around, turning by no more than `turn` a frame.
+fn look_around(eyes: &[DVec3], target: Option<DVec3>, speed: f64, turn: f64, rng: &mut Random) -> Vec<Pose> {
     let ahead = ((12.0 * speed).max(2.4) / speed) as usize;
     let (mut yaw, mut pitch) = (rng.range(0.0, TAU), 0.0);
     let mut wanted: Vec<[f64; 2]> = Vec::with_capacity(eyes.len());
     let phases = [rng.range(0.0, TAU), rng.range(0.0, TAU), rng.range(0.0, TAU), rng.range(0.0, TAU)];
     for (i, eye) in eyes.iter().enumerate() {
-        let way = eyes[(i + ahead).min(eyes.len() - 1)] - *eye;
+        let way = target.unwrap_or(eyes[(i + ahead).min(eyes.len() - 1)]) - *eye;
         let flat = libm::hypot(way.x, way.y);
         if flat > 2.0 * speed {
             let turned = libm::atan2(way.y, way.x) - yaw;

@@ -29,6 +29,8 @@ pub struct Space {
     pub state: Vec<u8>,
     /// Cells from the ideal eye height, for band cells.
     pub off: Vec<u8>,
+    /// No floors: the walk flies about the scene, which is at its middle.
+    pub flying: bool,
 }
 
 impl Space {
@@ -39,6 +41,7 @@ impl Space {
         if standing < 200 {
             // No floors to speak of: fly around the thing instead.
             space = Space::sample(scene, bounds, clearance, bounds.size().length() * 0.15);
+            space.flying = true;
             for s in space.state.iter_mut().filter(|s| **s & BLOCKED == 0) {
                 *s |= BAND;
             }
@@ -68,12 +71,14 @@ impl Space {
                 shape.mark(&scene.corners(t as u32), b, scene.two_sided[t], state);
             }
         });
-        Space { lo, cell, dims, off: vec![0; state.len()], state }
+        Space { lo, cell, dims, off: vec![0; state.len()], state, flying: false }
     }
 
     /// Marks the band above floors; returns how many band cells stand on something.
     fn find_band(&mut self, clearance: f64, eye: f64) -> usize {
         let (column, cell) = (self.dims[2], self.cell);
+        // Where cells are coarse the band must still be two of them deep, or slopes would cut it.
+        let top = (1.3 * eye).max(0.75 * eye + 2.2 * cell);
         let count = |(state, off): (&mut [u8], &mut [u8])| {
             let (mut below, mut found) = (None, 0);
             for z in 0..column {
@@ -81,7 +86,7 @@ impl Space {
                     below = Some((z, state[z] & FLOOR != 0));
                 } else if let Some((floor, true)) = below {
                     let height = (z - floor) as f64 * cell + clearance;
-                    if height >= 0.75 * eye && (height <= 1.3 * eye || (z - floor) as f64 <= 1.5) {
+                    if height >= 0.75 * eye && height <= top {
                         state[z] |= BAND;
                         off[z] = ((height - eye).abs() / cell + 0.5) as u8;
                         found += 1;
