@@ -46,7 +46,7 @@ impl Piece {
         Aabb { lo: (bounds.lo - grow).max(limit.lo), hi: (bounds.hi + grow).min(limit.hi) }
     }
 
-    /// Twice the area, squared-free: the length of the normal.
+    /// Not normalised: its length is twice the area.
     pub fn normal(&self) -> DVec3 {
         let [a, b, c] = self.corners;
         (b - a).cross(c - a)

@@ -69,8 +69,7 @@ fn half_spaces_hold_the_pieces_of_their_nodes() {
     }
 }
 
-/// The leaves in the order in which they may hide each other from nowhere
-/// behind: front first. Ends with the one leaf that holds `eye`'s cell inside.
+/// The leaves from front to back: at every plane the eye's side first.
 fn front_to_back(h: &Hierarchy, eye: DVec3) -> Vec<(u32, u32)> {
     let mut out = Vec::new();
     let mut pending = vec![(0u32, 0usize)];
