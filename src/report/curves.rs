@@ -4,6 +4,7 @@ use super::consolidate::{BandPoint, band};
 use super::facets::{self, Sample};
 use super::figure::{Figure, Mark, Part};
 use super::labels::Grid;
+use super::metrics::frames;
 use super::rows::absence;
 use super::scale::Scale;
 use super::style::Legend;
@@ -46,9 +47,9 @@ pub fn draw(grid: &Grid, legend: &Legend, what: &Curves) -> Figure {
         figure.part(Part::Plot, plot);
         let points = || curves[i].iter().flatten();
         let values: Vec<f64> = points().flat_map(|p| [p.low, p.high]).collect();
-        let y = Scale::fitting(&values).onto(plot.bottom(), plot.y);
-        let last = points().map(|p| p.frame).fold(1.0, f64::max);
-        let x = Scale { high: last.max(1.0), ..Scale::from_zero([1.0]) }.onto(plot.x, plot.right());
+        let y = y_scale(grid, i, &curves[i], &values).onto(plot.bottom(), plot.y);
+        let last = grid.cells[i].iter().flatten().map(|r| frames(r)).max().unwrap_or(1);
+        let x = Scale { high: last.max(1) as f64, ..Scale::from_zero([1.0]) }.onto(plot.x, plot.right());
         facets::panel_head(&mut figure, plot, &grid.places[i], &missing(grid, i));
         facets::y_axis(&mut figure, plot, &y, 5);
         facets::x_axis(&mut figure, plot, &x, 6, true);
@@ -75,6 +76,14 @@ pub fn draw(grid: &Grid, legend: &Legend, what: &Curves) -> Figure {
     figure
 }
 
+/// Linear from zero unless the combinations that cull range widely: those that
+/// cull nothing cost next to nothing and must not squeeze all others.
+fn y_scale(grid: &Grid, place: usize, curves: &[Vec<BandPoint>], all: &[f64]) -> Scale {
+    let culls = |c: &usize| grid.cells[place][*c].is_some_and(|r| r.culling != "none");
+    let working: Vec<f64> = (0..curves.len()).filter(culls).flat_map(|c| curves[c].iter().map(|p| p.middle)).collect();
+    if Scale::fitting(&working).is_log() { Scale::fitting(all) } else { Scale::from_zero(all.iter().copied()) }
+}
+
 /// "2 failed, 1 wrong" for the combinations without a line.
 fn missing(grid: &Grid, place: usize) -> String {
     let mut counts: Vec<(&str, usize)> = Vec::new();
@@ -82,7 +91,7 @@ fn missing(grid: &Grid, place: usize) -> String {
         if cell.is_some_and(|r| r.status == RunStatus::Done) {
             continue;
         }
-        let words = absence(*cell).0.trim_start_matches("✕ ");
+        let words = absence(*cell).0;
         match counts.iter_mut().find(|(w, _)| *w == words) {
             Some((_, n)) => *n += 1,
             None => counts.push((words, 1)),

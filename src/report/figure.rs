@@ -196,26 +196,8 @@ impl Figure {
             Shape::Diamond => polygon(self, &[(0.0, -1.2), (1.2, 0.0), (0.0, 1.2), (-1.2, 0.0)]),
             Shape::Up => polygon(self, &[(0.0, -1.15), (1.1, 0.8), (-1.1, 0.8)]),
             Shape::Down => polygon(self, &[(0.0, 1.15), (1.1, -0.8), (-1.1, -0.8)]),
-            Shape::Cross => {
-                let (a, b) = (0.35, 1.1);
-                polygon(
-                    self,
-                    &[
-                        (-a, -b),
-                        (a, -b),
-                        (a, -a),
-                        (b, -a),
-                        (b, a),
-                        (a, a),
-                        (a, b),
-                        (-a, b),
-                        (-a, a),
-                        (-b, a),
-                        (-b, -a),
-                        (-a, -a),
-                    ],
-                );
-            }
+            Shape::Cross => polygon(self, &cross(0.0)),
+            Shape::Times => polygon(self, &cross(std::f64::consts::FRAC_PI_4)),
         }
     }
 
@@ -239,6 +221,14 @@ impl Figure {
     pub fn part(&mut self, part: Part, r: Rect) {
         self.boxes.push((part, r));
     }
+}
+
+/// Twelve corners of a plus of half width 1.1, turned by `angle`.
+fn cross(angle: f64) -> [(f64, f64); 12] {
+    let (a, b) = (0.35, 1.1);
+    let (sin, cos) = angle.sin_cos();
+    [(-a, -b), (a, -b), (a, -a), (b, -a), (b, a), (a, a), (a, b), (-a, b), (-a, a), (-b, a), (-b, -a), (-a, -a)]
+        .map(|(x, y)| (x * cos - y * sin, x * sin + y * cos))
 }
 
 /// The box of text on baseline `y`: from cap height to descender.

@@ -11,40 +11,40 @@ pub fn findings(grid: &Grid) -> Vec<String> {
     let mut out = Vec::new();
     for (place, row) in grid.places.iter().zip(&grid.cells) {
         let done: Vec<&RunResult> = row.iter().filter_map(|c| *c).filter(|r| r.status == RunStatus::Done).collect();
-        out.extend(fastest(grid, place, &done, known("total_cull_ms"), "culls fastest", true));
-        out.extend(fastest(grid, place, &done, known("frame_ms_model"), "has the shortest modelled frame", false));
+        let cull = fastest(grid, &done, known("total_cull_ms"), true).map(|s| format!("{s} over the path"));
+        let frame = fastest(grid, &done, known("frame_ms_model"), false);
+        let parts = [("fastest culling", cull), ("shortest modelled frame", frame)];
+        let parts: Vec<String> = parts.into_iter().filter_map(|(what, s)| Some(format!("{what}: {}", s?))).collect();
+        if !parts.is_empty() {
+            out.push(format!("{place}. {}.", super::format::capital(&parts.join("; "))));
+        }
     }
     out.extend(exactness(grid));
     out
 }
 
-/// The best run by `metric` and its ratio against the baseline. Whoever culls
+/// The best run by `metric` with its ratio against the baseline. Whoever culls
 /// nothing has no culling time to speak of, so `working` leaves it out.
-fn fastest(
-    grid: &Grid,
-    place: &str,
-    done: &[&RunResult],
-    metric: &Metric,
-    what: &str,
-    working: bool,
-) -> Option<String> {
+fn fastest(grid: &Grid, done: &[&RunResult], metric: &Metric, working: bool) -> Option<String> {
     let candidates = done.iter().filter(|r| !working || r.culling != "none");
     let (best, value) = candidates.filter_map(|r| Some((*r, metric.value(r)?))).min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let mut sentence =
-        format!("On {place}, {} {what}: {} {}", combination(grid.results, best), format::number(value, 3), metric.unit);
-    if working {
-        sentence += " over the path";
-    }
-    if let Some(base) = baseline(done, best, working) {
-        let (r, low, high) = ratio(&[(metric.values(base), metric.values(best))]);
-        let spread = if low < high {
-            format!(" [{}, {}]", format::number(low, 3), format::number(high, 3))
-        } else {
-            String::new()
-        };
-        sentence += &format!(", {}{spread} less than {}", format::ratio(r), combination(grid.results, base));
-    }
-    Some(sentence + ".")
+    let mut sentence = format!("{}, {} {}", combination(grid.results, best), format::number(value, 3), metric.unit);
+    let Some(base) = baseline(done, best, working) else { return Some(sentence) };
+    let (r, low, high) = ratio(&[(metric.values(base), metric.values(best))]);
+    let base = combination(grid.results, base);
+    sentence += &match (low, high) {
+        _ if low <= 1.0 && high >= 1.0 => format!(" (not distinguishable from {base})"),
+        // 1.00 times faster is no finding, however sure.
+        _ if r < 1.005 => format!(" (within 0.5 % of {base})"),
+        _ if low == high => format!(" ({} faster than {base})", format::ratio(r)),
+        _ => format!(
+            " ({} [{}, {}] faster than {base})",
+            format::ratio(r),
+            format::number(low, 3),
+            format::number(high, 3)
+        ),
+    };
+    Some(sentence)
 }
 
 /// `list × none` where work beyond culling counts; among those that cull, the

@@ -6,6 +6,7 @@ use super::figure::{Figure, Mark, Part, Rect, plain};
 use super::font;
 use super::scale::Scale;
 use super::style::{ALARM, Colour, FRAME, INK, MUTED, PALETTE, Shape};
+use crate::claim::Relation;
 
 const ROW: f64 = 18.0;
 
@@ -30,7 +31,10 @@ pub fn draw(judged: &[Judged]) -> Option<Figure> {
         for (v, low, high) in [g.ratio, g.model_ratio].into_iter().flatten() {
             values.extend([v, low, high]);
         }
-        values.extend(claim.claim.published_of(&g.name).into_iter().flatten());
+        let slack = claim.claim.tolerance.min(0.9);
+        values.extend(
+            claim.claim.published_of(&g.name).into_iter().flat_map(|[a, b]| [a * (1.0 - slack), b * (1.0 + slack)]),
+        );
     }
     if shown.is_empty() || values.len() == 1 {
         return None;
@@ -38,7 +42,7 @@ pub fn draw(judged: &[Judged]) -> Option<Figure> {
     let rows = groups().count() + shown.len();
     let names = groups().map(|(_, g)| font::width(&g.name, BODY, false)).fold(90.0, f64::max);
     let (left, w) = (16.0 + names + 20.0, 470.0);
-    let (top, h) = (84.0, ROW * rows as f64 + 6.0);
+    let (top, h) = (76.0, ROW * rows as f64 + 6.0);
     let words = font::width(Verdict::ModelOnly.word(), BODY, false);
     let mut figure = Figure::new(
         "claims",
@@ -49,8 +53,14 @@ pub fn draw(judged: &[Judged]) -> Option<Figure> {
     facets::title(
         &mut figure,
         "Published claims against measured ratios",
-        "● measured or counted   ◆ with modelled frame time; bars: 95 % interval; grey: published range; line: equal.",
+        "Bars: 95 % interval; grey: published range, pale with the tolerance; line: equal.",
     );
+    for (x, shape, words) in
+        [(16.0, Shape::Circle, "measured or counted"), (150.0, Shape::Diamond, "with modelled frame time")]
+    {
+        figure.marker(x + 5.0, 59.0, 3.6, shape, MUTED, 1.0);
+        figure.label(x + 15.0, 63.0, words, plain(SMALL, MUTED));
+    }
     let plot = Rect::new(left, top, w, h);
     figure.part(Part::Plot, plot);
     let scale = Scale::log(values).onto(plot.x, plot.right());
@@ -70,8 +80,11 @@ pub fn draw(judged: &[Judged]) -> Option<Figure> {
             let middle = y - 5.0;
             figure.label(left - 12.0, middle + 3.8, &group.name, plain(BODY, INK).end());
             if let Some([a, b]) = claim.claim.published_of(&group.name) {
-                let (x0, x1) = (scale.at(a), scale.at(b));
-                figure.rect(Rect::new(x0 - 2.0, middle - 7.0, x1 - x0 + 4.0, 14.0), MUTED, 0.3);
+                let slack = if claim.claim.relation == Relation::Ratio { claim.claim.tolerance } else { 0.0 };
+                for (low, high) in [(a * (1.0 - slack), b * (1.0 + slack)), (a, b)] {
+                    let (x0, x1) = (scale.at(low), scale.at(high));
+                    figure.rect(Rect::new(x0 - 1.5, middle - 7.0, x1 - x0 + 3.0, 14.0), MUTED, 0.22);
+                }
             }
             let ink = colour(group.verdict);
             for (ratio, shape, dy) in [(group.model_ratio, Shape::Diamond, 3.0), (group.ratio, Shape::Circle, -3.0)] {

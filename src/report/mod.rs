@@ -13,6 +13,7 @@ pub mod compare;
 pub mod consolidate;
 pub mod curves;
 pub mod facets;
+pub mod fields;
 pub mod figure;
 pub mod filter;
 pub mod findings;

@@ -5,7 +5,7 @@ use super::claims::{Judged, Verdict};
 use super::figure::Figure;
 use super::findings::findings;
 use super::font;
-use super::format::{count, html};
+use super::format::{capital, count, html};
 use super::labels::Grid;
 use super::style::DARK;
 use super::table::{Table, status_word};
@@ -175,11 +175,6 @@ fn claims_html(content: &Content) -> String {
     out += "</ul>\n";
     out += &figures(content, &["claims"]);
     out + &table(content, "claims")
-}
-
-fn capital(text: &str) -> String {
-    let mut chars = text.chars();
-    chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
 }
 
 fn figures(content: &Content, ids: &[&str]) -> String {

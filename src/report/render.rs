@@ -81,11 +81,12 @@ pub fn png(figure: &Figure) -> Result<Vec<u8>> {
     let scale = PNG_SCALE * PNG_SAMPLES;
     let size = |x: f64| (x.ceil() as usize) * PNG_SCALE;
     let (w, h) = (size(figure.width), size(figure.height));
-    let mut fine = vec![0u8; 3 * w * h * PNG_SAMPLES * PNG_SAMPLES];
+    // White from the start: the paper needs no painting.
+    let mut fine = vec![255u8; 3 * w * h * PNG_SAMPLES * PNG_SAMPLES];
     {
         let size = ((w * PNG_SAMPLES) as u32, (h * PNG_SAMPLES) as u32);
         let root = BitMapBackend::with_buffer(&mut fine, size).into_drawing_area();
-        draw(figure, &root, scale as f64, font::HEIGHT_EM, Baseline::HalfSizeBelow, true)?;
+        draw(figure, &root, scale as f64, font::HEIGHT_EM, Baseline::HalfSizeBelow, false)?;
     }
     let pixels = average(&fine, w, h);
     let mut out = Vec::new();

@@ -11,6 +11,8 @@ use super::style::{ALARM, Colour, INK, Legend, MUTED, SHADE};
 use crate::results::{RunResult, RunStatus};
 
 const ROW: f64 = 19.0;
+/// Of the whole figure, when panels fill it.
+const WIDTH: f64 = 1040.0;
 
 /// What a cell shows.
 pub enum Datum {
@@ -45,8 +47,8 @@ pub fn absence(run: Option<&RunResult>) -> (&'static str, bool, Colour) {
     match run.map(|r| r.status) {
         None => ("not in the matrix", false, MUTED),
         Some(RunStatus::Pending) => ("pending", false, MUTED),
-        Some(RunStatus::Failed) => ("✕ failed", true, ALARM),
-        Some(RunStatus::Wrong) => ("✕ wrong: withheld", true, ALARM),
+        Some(RunStatus::Failed) => ("failed", true, ALARM),
+        Some(RunStatus::Wrong) => ("wrong: withheld", true, ALARM),
         Some(RunStatus::Done) => ("no value", false, MUTED),
     }
 }
@@ -58,14 +60,27 @@ pub fn draw(grid: &Grid, legend: &Legend, what: &Rows) -> Figure {
         .map(|row| row.iter().map(|cell| cell.filter(|r| r.status == RunStatus::Done).and_then(what.datum)).collect())
         .collect();
     let extent: Vec<f64> = data.iter().flatten().flatten().flat_map(Datum::extent).collect();
-    let scale = if what.linear { Scale::from_zero(extent) } else { Scale::fitting(&extent) };
+    // Those that cull nothing cost next to nothing: they must not decide for a logarithm.
+    let working: Vec<f64> = grid
+        .cells
+        .iter()
+        .zip(&data)
+        .flat_map(|(cells, data)| cells.iter().zip(data))
+        .filter(|(cell, _)| cell.is_some_and(|r| r.culling != "none"))
+        .flat_map(|(_, datum)| datum.iter().flat_map(Datum::extent))
+        .collect();
+    let linear = what.linear || !Scale::fitting(&working).is_log();
+    let scale = if linear { Scale::from_zero(extent) } else { Scale::log(extent) };
 
     let names = grid.combinations.iter().map(|l| font::width(l, BODY, false)).fold(0.0, f64::max);
     let left = 16.0 + names + 14.0;
-    let columns = grid.places.len().clamp(1, if names > 210.0 { 3 } else { 4 });
-    let rows = grid.places.len().div_ceil(columns);
+    // As many panels beside each other as fit, in rows of equal length.
+    let n = grid.places.len().max(1);
+    let fitting = (((WIDTH - left - 24.0) / 172.0) as usize).clamp(1, 4);
+    let rows = n.div_ceil(fitting);
+    let columns = n.div_ceil(rows);
     let gap = (22.0, 62.0);
-    let w = ((1000.0 - left - 24.0 - gap.0 * (columns as f64 - 1.0)) / columns as f64).clamp(120.0, 420.0);
+    let w = ((WIDTH - left - 24.0 - gap.0 * (columns as f64 - 1.0)) / columns as f64).clamp(120.0, 420.0);
     let h = ROW * grid.combinations.len() as f64 + 6.0;
     let width = left + w * columns as f64 + gap.0 * (columns as f64 - 1.0) + 24.0;
     let width = width.max(16.0 + font::width(what.sub, BODY, false) + 16.0);
@@ -131,13 +146,15 @@ fn draw_absence(figure: &mut Figure, plot: Rect, y: f64, run: Option<&RunResult>
         figure.rect(cell, SHADE, 1.0);
     }
     let style = plain(SMALL, colour);
-    let text = super::figure::text_box(plot.x + 8.0, y + 3.6, words, style);
+    let x = plot.x + if hatched { 19.0 } else { 8.0 };
+    let text = super::figure::text_box(x, y + 3.6, words, style);
     if hatched {
+        figure.marker(plot.x + 10.0, y, 3.4, super::style::Shape::Times, colour, 1.0);
         // The hatch keeps clear of the words.
         let from = text.right() + 6.0;
         figure.hatch(Rect::new(from, cell.y, (cell.right() - from).max(0.0), cell.h), colour, 6.0);
     }
-    figure.label(plot.x + 8.0, y + 3.6, words, style);
+    figure.label(x, y + 3.6, words, style);
 }
 
 /// The chart in words.

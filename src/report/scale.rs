@@ -31,12 +31,11 @@ pub struct Tick {
 const WIDE: f64 = 25.0;
 
 impl Scale {
-    /// A linear scale from zero with a nice end.
+    /// A linear scale from zero with a little air at the end.
     pub fn from_zero(values: impl IntoIterator<Item = f64>) -> Scale {
         let high = values.into_iter().filter(|v| v.is_finite()).fold(0.0, f64::max);
         let high = if high > 0.0 { high } else { 1.0 };
-        let step = nice_step(high / 4.0);
-        Scale { kind: Kind::Linear, low: 0.0, high: (high * 1.02 / step).ceil() * step, from: 0.0, to: 1.0 }
+        Scale { kind: Kind::Linear, low: 0.0, high: high * 1.06, from: 0.0, to: 1.0 }
     }
 
     /// A logarithmic scale over the positive values, with a little air.
@@ -106,8 +105,10 @@ impl Scale {
         let decades = (self.high / self.low).log10();
         // Few decades: label 1, 2, 5; many: every n-th decade.
         let labelled: &[i32] = match decades / wanted.max(1) as f64 {
-            d if d <= 0.34 => &[1, 2, 5],
-            d if d <= 0.55 => &[1, 3],
+            d if d <= 0.08 => &[1, 2, 3, 4, 5, 6, 7, 8, 9],
+            d if d <= 0.16 => &[1, 2, 3, 5, 7],
+            d if d <= 0.36 => &[1, 2, 5],
+            d if d <= 0.8 => &[1, 3],
             _ => &[1],
         };
         let every = (decades / wanted.max(1) as f64).ceil().max(1.0) as i32;

@@ -6,7 +6,7 @@ use super::figure::{Anchor, Figure, Part, Rect, TextStyle, plain, text_box};
 use super::labels::Grid;
 use super::pareto;
 use super::scale::{Kind, Scale};
-use super::style::{FRAME, GRID, INK, Legend, MUTED, SHADE};
+use super::style::{FRAME, INK, Legend, MUTED, SHADE};
 use crate::results::{RunResult, RunStatus};
 
 pub struct Scatter<'a> {
@@ -72,8 +72,8 @@ fn panel(figure: &mut Figure, grid: &Grid, legend: &Legend, what: &Scatter, plac
     let x = x.onto(plot.x + inset, plot.right() - 14.0);
     let zeros = ys.iter().filter(|y| **y <= 0.0).count();
     let y = if what.zero_bin {
-        // Labels of the points at zero stack within the bin.
-        let bin = if zeros == ys.len() { plot.h } else { (34.0 + 11.0 * zeros as f64).min(plot.h * 0.62) };
+        // Room for names above and below the points at zero.
+        let bin = if zeros == ys.len() { plot.h } else { if zeros == 0 { 22.0 } else { 64.0 } };
         let mut y = Scale::log(ys.iter().copied()).onto(plot.bottom(), plot.y);
         y.kind = Kind::LogZero(bin);
         zero_bin(figure, plot, bin, zeros == ys.len());
@@ -93,7 +93,8 @@ fn panel(figure: &mut Figure, grid: &Grid, legend: &Legend, what: &Scatter, plac
         dot.at = (x.at(dot.data.0), y.at(dot.data.1));
         dot.on_front = front.contains(&i);
     }
-    staircase(figure, &front.iter().map(|i| dots[*i].at).collect::<Vec<_>>(), plot);
+    let stairs = staircase(&front.iter().map(|i| dots[*i].at).collect::<Vec<_>>(), plot);
+    figure.dashed(&stairs, MUTED, 1.1, 0.9, &[4.0, 3.0]);
     for on_front in [false, true] {
         for dot in dots.iter().filter(|d| d.on_front == on_front) {
             let look = legend.look(&grid.combinations[dot.combination]);
@@ -101,7 +102,7 @@ fn panel(figure: &mut Figure, grid: &Grid, legend: &Legend, what: &Scatter, plac
             figure.marker(dot.at.0, dot.at.1, radius, look.shape, look.colour, alpha);
         }
     }
-    name_dots(figure, grid, &dots, plot);
+    name_dots(figure, grid, &dots, &stairs, plot);
     dots
 }
 
@@ -112,44 +113,46 @@ fn zero_bin(figure: &mut Figure, plot: Rect, bin: f64, alone: bool) {
         figure.segment((plot.x, y), (plot.right(), y), FRAME, 1.0);
     }
     figure.label(plot.x - 7.0, plot.bottom() - bin / 2.0 + 3.6, "0", plain(SMALL, MUTED).end());
-    figure.segment((plot.x, plot.bottom() - bin / 2.0), (plot.right(), plot.bottom() - bin / 2.0), GRID, 1.0);
 }
 
 /// The border of what is attainable: from each point of the front right, then down.
-fn staircase(figure: &mut Figure, front: &[(f64, f64)], plot: Rect) {
-    let Some(first) = front.first() else { return };
+fn staircase(front: &[(f64, f64)], plot: Rect) -> Vec<(f64, f64)> {
+    let Some(first) = front.first() else { return Vec::new() };
     let mut line = vec![(first.0, plot.y)];
     for (i, p) in front.iter().enumerate() {
         line.push(*p);
         let right = front.get(i + 1).map_or(plot.right(), |n| n.0);
         line.push((right, p.1));
     }
-    figure.dashed(&line, MUTED, 1.1, 0.9, &[4.0, 3.0]);
+    line
 }
 
-/// Names beside the dots, the front first. A name that finds no free place near
-/// its dot moves away on a thin leader; one that finds none at all is left to the legend.
-fn name_dots(figure: &mut Figure, grid: &Grid, dots: &[Dot], plot: Rect) {
+/// Names beside the dots, the front first, clear of dots, of the front's line
+/// and of each other. What is dominated gets its name where there is room right
+/// beside it; the legend names everything.
+fn name_dots(figure: &mut Figure, grid: &Grid, dots: &[Dot], stairs: &[(f64, f64)], plot: Rect) {
     let mut taken: Vec<Rect> = dots.iter().map(|d| Rect::new(d.at.0 - 5.0, d.at.1 - 5.0, 10.0, 10.0)).collect();
+    taken.extend(stairs.windows(2).map(|s| {
+        let (x, y) = (s[0].0.min(s[1].0), s[0].1.min(s[1].1));
+        Rect::new(x - 1.0, y - 1.0, (s[1].0 - s[0].0).abs() + 2.0, (s[1].1 - s[0].1).abs() + 2.0)
+    }));
     let mut order: Vec<&Dot> = dots.iter().collect();
+    let key = |d: &Dot| (!d.on_front, d.at.0, d.combination);
     order.sort_by(|a, b| {
-        b.on_front.cmp(&a.on_front).then(a.at.0.total_cmp(&b.at.0)).then(a.combination.cmp(&b.combination))
+        let (a, b) = (key(a), key(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))
     });
     for dot in order {
         let name = &grid.combinations[dot.combination];
         let colour = if dot.on_front { INK } else { MUTED };
         let style = TextStyle { bold: dot.on_front, ..plain(SMALL, colour) };
         let Some((r, style, x, y)) = free_place(dot.at, name, style, plot, &taken) else { continue };
-        let nearest_x = dot.at.0.clamp(r.x, r.right());
-        let nearest_y = if r.y > dot.at.1 { r.y } else { r.bottom().min(dot.at.1) };
-        if (nearest_x - dot.at.0).hypot(nearest_y - dot.at.1) > 14.0 {
-            figure.line(vec![dot.at, (nearest_x, nearest_y)], MUTED, 0.7, 0.55);
-        }
         figure.label(x, y, name, style);
         taken.push(r);
     }
 }
 
+/// A place for `name` that touches nothing: right of the dot, left, above, below.
 fn free_place(
     at: (f64, f64),
     name: &str,
@@ -157,19 +160,20 @@ fn free_place(
     plot: Rect,
     taken: &[Rect],
 ) -> Option<(Rect, TextStyle, f64, f64)> {
-    for ring in 0..14 {
-        let dy = 12.0 * f64::from(ring);
-        let rows = if ring == 0 { vec![3.6] } else { vec![3.6 - dy, 3.6 + dy] };
-        for row in rows {
-            for (anchor, dx) in [(Anchor::Start, 9.0), (Anchor::End, -9.0), (Anchor::Middle, 0.0)] {
-                let style = TextStyle { anchor, ..style };
-                let (x, y) = (at.0 + dx, at.1 + row);
-                let r = text_box(x, y, name, style);
-                if plot.contains(&r) && !taken.iter().any(|t| t.overlaps(&r)) {
-                    return Some((r, style, x, y));
-                }
-            }
-        }
-    }
-    None
+    let places = [
+        (Anchor::Start, 9.0, 3.6),
+        (Anchor::Start, 7.0, -5.0),
+        (Anchor::Start, 7.0, 13.0),
+        (Anchor::End, -9.0, 3.6),
+        (Anchor::End, -7.0, -5.0),
+        (Anchor::End, -7.0, 13.0),
+        (Anchor::Middle, 0.0, -9.0),
+        (Anchor::Middle, 0.0, 17.0),
+    ];
+    places.into_iter().find_map(|(anchor, dx, dy)| {
+        let style = TextStyle { anchor, ..style };
+        let (x, y) = (at.0 + dx, at.1 + dy);
+        let r = text_box(x, y, name, style);
+        (plot.contains(&r) && !taken.iter().any(|t| t.overlaps(&r))).then_some((r, style, x, y))
+    })
 }

@@ -45,6 +45,8 @@ pub enum Shape {
     Up,
     Down,
     Cross,
+    /// A slanted cross: not the marker of any combination, but of what failed.
+    Times,
 }
 
 const SHAPES: [Shape; 6] = [Shape::Circle, Shape::Square, Shape::Diamond, Shape::Up, Shape::Down, Shape::Cross];

@@ -172,7 +172,12 @@ impl Table {
             out += "<tr>";
             for (i, (cell, c)) in row.iter().zip(&self.columns).enumerate() {
                 let text = html_cell(cell);
-                let class = if c.numeric { " class=\"n\"" } else { "" };
+                let class = match cell {
+                    // Reasons wrap; names and numbers do not.
+                    Cell::Text(t) if t.chars().count() > 34 => " class=\"t\"",
+                    _ if c.numeric => " class=\"n\"",
+                    _ => "",
+                };
                 out += &if i < self.heads {
                     format!("<th scope=\"row\">{text}</th>")
                 } else {
