@@ -3,8 +3,11 @@
 //! instead of waiting for the lease to run out.
 
 /// This process, as a lease names it.
-pub fn this() -> String {
-    format!("{}:{}:{}", machine(), std::process::id(), start_ticks(std::process::id()).unwrap_or(0))
+pub fn this() -> &'static str {
+    static THIS: std::sync::OnceLock<String> = std::sync::OnceLock::new();
+    THIS.get_or_init(|| {
+        format!("{}:{}:{}", machine(), std::process::id(), start_ticks(std::process::id()).unwrap_or(0))
+    })
 }
 
 /// True only if the holder surely no longer runs: it was on this machine and
@@ -47,7 +50,7 @@ mod tests {
     #[test]
     #[cfg(target_os = "linux")]
     fn the_living_keep_their_leases_and_the_dead_do_not() {
-        assert!(!is_dead(&this()));
+        assert!(!is_dead(this()));
         let mut child = std::process::Command::new("sleep").arg("60").spawn().unwrap();
         let start = start_ticks(child.id()).unwrap();
         let owner = format!("{}:{}:{start}", machine(), child.id());

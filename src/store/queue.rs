@@ -107,7 +107,7 @@ impl Store {
         let row: Option<(i64, String, i64, i64, i64)> =
             sqlx::query_as(if kind == Kind::Trial { CLAIM_TRIAL } else { CLAIM_JUDGE })
                 .bind(study_id)
-                .bind(&me)
+                .bind(me)
                 .bind(now + term.as_millis() as i64)
                 .fetch_optional(&mut *tx)
                 .await
@@ -119,7 +119,7 @@ impl Store {
         sqlx::query("INSERT INTO attempts (job_id, epoch, owner, started_ms) VALUES ($1, $2, $3, $4)")
             .bind(id)
             .bind(epoch)
-            .bind(&me)
+            .bind(me)
             .bind(now)
             .execute(&mut *tx)
             .await

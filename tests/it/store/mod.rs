@@ -1,157 +1,16 @@
 //! The store: queue, leases, decisions, results, exchange. Records are fed in
 //! directly; `faults` drives the real program.
 
-use cullmark::culling::{Class, Removes};
-use cullmark::record::*;
-use cullmark::registry::{Spec, Value};
-use cullmark::results::{Excluded, RunStatus};
+mod figures;
+mod fixture;
+
+use cullmark::culling::Class;
+use cullmark::results::RunStatus;
 use cullmark::store::compact::Drop;
-use cullmark::store::{Accepted, Cell, Detail, Kind, Lease, Outcome, Store, Submission, read_results};
+use cullmark::store::{Accepted, Detail, Kind, Outcome, Store, Submission, read_results};
+use fixture::*;
 use std::path::Path;
-use std::time::{Duration, Instant};
-
-fn wait<T>(work: impl Future<Output = T>) -> T {
-    cullmark::store::block_on(work)
-}
-
-/// A plausible cell: `depth` tells runs apart, `scene` is its block.
-fn spec(scene: &str, depth: i64) -> RunSpec {
-    RunSpec {
-        scene: SceneSpec {
-            name: scene.into(),
-            source: SceneSource::Generated(Spec::new("arena")),
-            winding: Winding::Ccw,
-            up: Up::Z,
-            scale: 1.0,
-            weld: false,
-            fingerprint: format!("scene {scene}"),
-        },
-        path: PathSpec {
-            name: "walk".into(),
-            source: PathSource::Generated(Spec::new("walk")),
-            frames: None,
-            stride: 1,
-            fingerprint: "path".into(),
-        },
-        camera: Default::default(),
-        structure: Spec::new("octree").with("depth", Value::Int(depth)),
-        culling: vec![Spec::new("frustum")],
-        walk: Spec::new("depth_first"),
-        axes: Default::default(),
-        revisions: Default::default(),
-        accuracy: Accuracy { frames: 2, width_px: 64, height_px: 36, samples: 1 },
-        protocol: Protocol {
-            passes: 2,
-            warmup_passes: 1,
-            pin_core: None,
-            build_profile: "release".into(),
-            isa: "scalar".into(),
-            threads: 1,
-        },
-        series: 0,
-        model: TimeModel::default(),
-    }
-}
-
-fn policy(repeats: u32) -> RepeatPolicy {
-    RepeatPolicy { repeats, relative_ci: None, max_repeats: 9, timeout_s: 60.0, memory_limit_mib: None, seed: 7 }
-}
-
-fn study(name: &str, specs: Vec<RunSpec>, repeats: u32) -> Submission {
-    let cell = |spec: RunSpec| Cell {
-        structure: spec.structure.to_string(),
-        culling: "frustum".into(),
-        walk: "depth_first".into(),
-        spec,
-    };
-    Submission {
-        name: name.into(),
-        title: format!("Study {name}"),
-        manifest_toml: "# nothing".into(),
-        claims_json: "[]".into(),
-        consolidate_frames: 10,
-        policy: policy(repeats),
-        machine_class: "test".into(),
-        series: specs.first().map_or(0, |s| s.series),
-        cells: specs.into_iter().map(cell).collect(),
-        excluded: vec![Excluded { cell: "bsp".into(), why: "too slow".into(), count: 3 }],
-        retry_failed: false,
-    }
-}
-
-/// A trial whose frames took `base_ns`, `base_ns + 1`, ...
-fn record(base_ns: f64, hash: &str) -> TrialRecord {
-    let times: Vec<f64> = (0..20).map(|f| base_ns + f64::from(f) + 0.25).collect();
-    let counted = |name: &str, k: f64| Series {
-        name: name.into(),
-        unit: "1".into(),
-        values: (0..20).map(|f| k + f64::from(f % 3)).collect(),
-    };
-    TrialRecord {
-        load_ns: 1,
-        build_ns: 2,
-        prepare_ns: 3,
-        structure_bytes: 4,
-        test_bytes: 5,
-        peak_rss_bytes: 6,
-        build: Default::default(),
-        entries: 7,
-        scene_triangles: 8,
-        load: Default::default(),
-        counters: vec![Counter { name: "plane_tests".into(), unit: "planes".into(), value: 99.0 }],
-        series: vec![
-            Series { name: "cull_ns".into(), unit: "ns".into(), values: times.clone() },
-            counted("triangles", 500.0),
-            counted("draw_calls", 3.0),
-            counted("nodes_visited", 40.0),
-        ],
-        passes_ns: vec![times.iter().map(|t| t + 0.1).collect(), times],
-        frames_hash: hash.into(),
-        sentinel: Sentinel { before_ns: 1000.0, after_ns: 1000.0, involuntary_switches: 0 },
-        environment: Environment { machine_class: "test".into(), cores: 2, ..Default::default() },
-    }
-}
-
-fn judgement(wrong: Option<&str>, hash: &str) -> Judgement {
-    Judgement {
-        class: Class::Conservative,
-        removes: Removes::default(),
-        wrong: wrong.map(Into::into),
-        frames: vec![FrameErrors { frame: 3, submitted: 10, visible: 9, ..Default::default() }],
-        frames_hash: hash.into(),
-    }
-}
-
-async fn open(dir: &Path) -> Store {
-    Store::open(&dir.join("x.db")).await.unwrap()
-}
-
-async fn lease(store: &Store, study: i64, kind: Kind) -> Lease {
-    store.lease(study, kind).await.unwrap().expect("a job waits")
-}
-
-/// Judges and takes trials until nothing waits; `make` answers each trial.
-async fn finish(store: &Store, study: i64, policy: &RepeatPolicy, make: impl Fn(&Lease) -> TrialRecord) {
-    loop {
-        let mut worked = false;
-        while let Some(l) = store.lease(study, Kind::Judge).await.unwrap() {
-            store.accept_judgement(&l, &judgement(None, "h"), 1).await.unwrap();
-            for id in store.unsettled(study, Some(&l.job.target)).await.unwrap() {
-                store.settle(study, &id, policy).await.unwrap();
-            }
-            worked = true;
-        }
-        while let Some(l) = store.lease(study, Kind::Trial).await.unwrap() {
-            store.accept_trial(&l, &make(&l), 1_000_000).await.unwrap();
-            store.mark_noise(&l.job.target, l.job.repeat, l.job.take, 40).await.unwrap();
-            store.settle(study, &l.job.target, policy).await.unwrap();
-            worked = true;
-        }
-        if !worked {
-            return;
-        }
-    }
-}
+use std::time::Duration;
 
 #[test]
 fn a_study_is_queued_once_interleaved_and_its_results_come_back() {
@@ -430,25 +289,6 @@ fn compacting_keeps_what_was_measured_and_drops_passes_only_when_asked() {
         let done = store.compact(Drop { passes: true, orphans: true }).await.unwrap();
         assert!(done.rows_dropped >= 120, "{done:?}");
         assert_eq!(serde_json::to_value(store.results("a").await.unwrap()).unwrap(), before);
-    });
-}
-
-#[test]
-fn a_thousand_finished_cells_are_submitted_again_at_once() {
-    let dir = tempfile::tempdir().unwrap();
-    wait(async {
-        let store = open(dir.path()).await;
-        let s = study("a", (0..1000).map(|d| spec(["p", "q", "r"][d as usize % 3], d)).collect(), 1);
-        assert_eq!(store.submit(&s).await.unwrap().new, 1000);
-        // Finished the short way: what is timed is the looking up.
-        store.close().await;
-        let pool = Store::open(&dir.path().join("x.db")).await.unwrap();
-        let start = Instant::now();
-        let again = pool.submit(&s).await.unwrap();
-        let elapsed = start.elapsed();
-        assert_eq!((again.resumed, again.jobs_added), (1000, 0));
-        // 0.2 s in a release build on an idle machine; far more here is a scan where an index should be.
-        assert!(elapsed < Duration::from_secs(5), "{elapsed:?}");
     });
 }
 
