@@ -21,8 +21,11 @@ pub fn isa() -> &'static str {
     "scalar"
 }
 
+/// Cores this process may use. Asked once: pinning narrows what the system
+/// answers later, and a trial would name another class of machine than its study.
 pub fn core_count() -> u32 {
-    std::thread::available_parallelism().map_or(1, |n| n.get() as u32)
+    static CORES: std::sync::OnceLock<u32> = std::sync::OnceLock::new();
+    *CORES.get_or_init(|| std::thread::available_parallelism().map_or(1, |n| n.get() as u32))
 }
 
 /// `release`, `dist`, `debug`: as this binary was built.

@@ -2,11 +2,19 @@
 //! shadows, flat shading, stable colours a material. For pictures only: nothing
 //! here judges or measures anything (the oracle has its own, exact, buffers).
 
+mod palette;
+mod raster;
+mod views;
+
 use crate::error::{Error, Result};
-use crate::math::{Aabb, Camera, DVec3, Pose, Projection, View};
+use crate::math::{Camera, DVec3, Pose, Projection, View};
 use crate::scene::Scene;
+use palette::material_colour;
+use raster::{BACK_BIT, Buffers, NONE, rasterise, unproject};
 use rayon::prelude::*;
 use std::path::Path;
+
+pub use views::{draw_line, overview, plan};
 
 /// 8-bit RGBA, rows from the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,32 +56,6 @@ impl Default for Style<'_> {
     }
 }
 
-const NONE: u32 = u32::MAX;
-/// Rows a task rasterises.
-const BAND: usize = 32;
-
-/// A triangle on the screen: pixels and, linear in screen space, `q` (reciprocal
-/// depth in perspective, minus depth otherwise) and world height times that weight.
-#[derive(Clone, Copy)]
-struct Projected {
-    id: u32,
-    x: [f64; 3],
-    y: [f64; 3],
-    q: [f64; 3],
-    height: [f64; 3],
-    back: bool,
-    ghost: bool,
-}
-
-struct Buffers {
-    /// Larger is nearer.
-    q: Vec<f32>,
-    /// Triangle, or [`NONE`]; the top bit says that its back is seen.
-    id: Vec<u32>,
-}
-
-const BACK_BIT: u32 = 1 << 31;
-
 /// Renders `scene` as `view` sees it.
 pub fn render(scene: &Scene, view: &View, width: u32, height: u32, style: &Style) -> Image {
     let s = style.samples.clamp(1, 8);
@@ -109,31 +91,31 @@ pub fn render(scene: &Scene, view: &View, width: u32, height: u32, style: &Style
             Look::Ghost => DVec3::splat(0.85),
             _ => palette.get(scene.material_id[id as usize] as usize).copied().unwrap_or(DVec3::splat(0.7)),
         };
-        let lit = sun.as_ref().is_none_or(|s| s.lights(p + normal * 0.05));
-        let lambert = normal.dot(SUN).max(0.0) * if lit { 1.0 } else { 0.12 };
+        let lit = sun.as_ref().map_or(1.0, |s| s.light(p + normal * 0.05));
+        let lambert = normal.dot(SUN).max(0.0) * (0.1 + 0.9 * lit);
         let sky_light = 0.5 + 0.5 * normal.z;
         let fill = normal.dot(DVec3::new(-0.5, 0.4, 0.2)).max(0.0);
         let rise = if bounds.size().z > 0.0 { (p.z - bounds.lo.z) / bounds.size().z } else { 0.5 };
-        let light = 0.30 + 0.20 * sky_light + 0.12 * fill + 0.62 * lambert;
+        let light = 0.36 + 0.20 * sky_light + 0.14 * fill + 0.58 * lambert;
         base * light * (0.94 + 0.10 * rise)
     };
     let contact = |x: usize, y: usize| -> f64 {
-        // Darkens pixels that lie behind a near neighbour: a poor man's ambient occlusion.
-        let q = f64::from(buffers.q[y * w + x]);
-        let reach = (s as usize) * 3;
-        let mut hidden = 0.0;
-        for (dx, dy) in [(reach, 0), (0, reach), (reach, reach)] {
-            for (nx, ny) in [(x.wrapping_sub(dx), y.wrapping_sub(dy)), (x + dx, y + dy)] {
-                if nx < w && ny < h {
-                    let n = f64::from(buffers.q[ny * w + nx]);
-                    let step = if view.is_perspective() { n / q.max(1e-9) - 1.0 } else { (n - q) * 0.5 };
-                    if step > 0.02 {
-                        hidden += 1.0 / 6.0;
-                    }
-                }
-            }
+        // Darkens hollows, a poor man's ambient occlusion: `q` is linear over a plane,
+        // so opposite neighbours that are nearer on average mean a concave place.
+        let at = |x: usize, y: usize| f64::from(buffers.q[y * w + x]);
+        let (q, reach) = (at(x, y), s as usize * 3);
+        if x < reach || y < reach || x + reach >= w || y + reach >= h {
+            return 1.0;
         }
-        1.0 - 0.28 * hidden
+        let hollow = |a: f64, b: f64| {
+            let rise = (a + b) * 0.5 - q;
+            let relative = if view.is_perspective() { rise / q.max(1e-9) * 12.0 } else { rise };
+            // Much nearer neighbours are another thing in front, not a corner.
+            if !relative.is_finite() || relative <= 0.0 { 0.0 } else { relative.min(0.25 / relative).min(0.5) * 2.0 }
+        };
+        let across = hollow(at(x - reach, y), at(x + reach, y));
+        let along = hollow(at(x, y - reach), at(x, y + reach));
+        1.0 - 0.22 * across.max(along)
     };
     let mut rgba = vec![255u8; (width * height * 4) as usize];
     rgba.par_chunks_mut(width as usize * 4).enumerate().for_each(|(y, row)| {
@@ -160,126 +142,6 @@ fn rgb(c: [u8; 3]) -> DVec3 {
 /// Towards the sun; any unit vector that lights tops, one long and one short side.
 const SUN: DVec3 = DVec3::new(0.397_779, -0.530_372, 0.748_825);
 
-fn rasterise(scene: &Scene, view: &View, w: usize, h: usize, style: &Style, looks: &[Look]) -> Buffers {
-    let cull = style.cull_back_faces && style.cut_above_m.is_none();
-    let cut = style.cut_above_m.unwrap_or(f64::INFINITY);
-    let projected: Vec<Projected> = (0..scene.len() as u32)
-        .into_par_iter()
-        .filter(|t| looks[*t as usize] != Look::Hidden)
-        .flat_map_iter(|t| project(scene, view, w, h, t, cull, looks[t as usize] == Look::Ghost))
-        .collect();
-    let bands = h.div_ceil(BAND);
-    let mut bins: Vec<Vec<u32>> = vec![Vec::new(); bands];
-    for (i, p) in projected.iter().enumerate() {
-        let lo = p.y.iter().copied().fold(f64::INFINITY, f64::min).max(0.0);
-        let hi = p.y.iter().copied().fold(f64::NEG_INFINITY, f64::max).min(h as f64 - 1.0);
-        if lo <= hi {
-            for bin in &mut bins[lo as usize / BAND..=hi as usize / BAND] {
-                bin.push(i as u32);
-            }
-        }
-    }
-    let mut buffers = Buffers { q: vec![f32::NEG_INFINITY; w * h], id: vec![NONE; w * h] };
-    let rows = buffers.q.par_chunks_mut(w * BAND).zip(buffers.id.par_chunks_mut(w * BAND));
-    rows.zip(&bins).enumerate().for_each(|(band, ((q, id), bin))| {
-        for p in bin {
-            fill(&projected[*p as usize], band * BAND, w, q, id, cut, view.is_perspective());
-        }
-    });
-    buffers
-}
-
-/// Clips triangle `t` against the near plane and projects what is left.
-fn project(scene: &Scene, view: &View, w: usize, h: usize, t: u32, cull: bool, ghost: bool) -> Vec<Projected> {
-    let world = scene.corners(t);
-    let normal = scene.normal(t);
-    let back =
-        if view.is_perspective() { normal.dot(view.eye - world[0]) <= 0.0 } else { normal.dot(view.forward) >= 0.0 };
-    if back && cull && !scene.two_sided[t as usize] {
-        return Vec::new();
-    }
-    let near = view.camera.near_m;
-    let points: Vec<(DVec3, f64)> = world.iter().map(|p| (view.to_camera(*p), p.z)).collect();
-    let mut polygon: Vec<(DVec3, f64)> = Vec::with_capacity(4);
-    for i in 0..3 {
-        let (a, b) = (points[i], points[(i + 1) % 3]);
-        if a.0.z >= near {
-            polygon.push(a);
-        }
-        if (a.0.z >= near) != (b.0.z >= near) {
-            let s = (near - a.0.z) / (b.0.z - a.0.z);
-            polygon.push((a.0 + (b.0 - a.0) * s, a.1 + (b.1 - a.1) * s));
-        }
-    }
-    let screen = |(p, z): (DVec3, f64)| {
-        let q = if view.is_perspective() { 1.0 / p.z } else { -p.z };
-        let weight = if view.is_perspective() { q } else { 1.0 };
-        let x = (p.x * weight / view.half_width * 0.5 + 0.5) * w as f64;
-        let y = (0.5 - p.y * weight / view.half_height * 0.5) * h as f64;
-        (x, y, q, z * weight)
-    };
-    let corners: Vec<_> = polygon.into_iter().map(screen).collect();
-    (2..corners.len())
-        .map(|i| {
-            let c = [corners[0], corners[i - 1], corners[i]];
-            let (x, y) = (c.map(|c| c.0), c.map(|c| c.1));
-            Projected { id: t, x, y, q: c.map(|c| c.2), height: c.map(|c| c.3), back, ghost }
-        })
-        .collect()
-}
-
-fn fill(p: &Projected, top: usize, w: usize, q: &mut [f32], id: &mut [u32], cut: f64, perspective: bool) {
-    let rows = q.len() / w;
-    let area = (p.x[1] - p.x[0]) * (p.y[2] - p.y[0]) - (p.x[2] - p.x[0]) * (p.y[1] - p.y[0]);
-    if area.abs() < 1e-12 {
-        return;
-    }
-    let (lo_x, hi_x) = extent(&p.x, w as f64);
-    let y0 = (p.y.iter().copied().fold(f64::INFINITY, f64::min) - 0.5).ceil().max(top as f64);
-    let y1 = (p.y.iter().copied().fold(f64::NEG_INFINITY, f64::max) - 0.5).floor().min((top + rows - 1) as f64);
-    let (mut y, mark) = (y0, p.id | if p.back { BACK_BIT } else { 0 });
-    while y <= y1 {
-        for x in lo_x..hi_x {
-            let (px, py) = (x as f64 + 0.5, y + 0.5);
-            let b1 = ((px - p.x[0]) * (p.y[2] - p.y[0]) - (p.x[2] - p.x[0]) * (py - p.y[0])) / area;
-            let b2 = ((p.x[1] - p.x[0]) * (py - p.y[0]) - (px - p.x[0]) * (p.y[1] - p.y[0])) / area;
-            let b0 = 1.0 - b1 - b2;
-            if b0 < 0.0 || b1 < 0.0 || b2 < 0.0 {
-                continue;
-            }
-            let here = b0 * p.q[0] + b1 * p.q[1] + b2 * p.q[2];
-            let at = (y as usize - top) * w + x;
-            if (here as f32) <= q[at] || (p.ghost && (x ^ y as usize) & 1 == 1) {
-                continue;
-            }
-            let height = b0 * p.height[0] + b1 * p.height[1] + b2 * p.height[2];
-            if (if perspective { height / here } else { height }) > cut {
-                continue;
-            }
-            q[at] = here as f32;
-            id[at] = mark;
-        }
-        y += 1.0;
-    }
-}
-
-/// Pixel columns whose centres may lie within.
-fn extent(x: &[f64; 3], w: f64) -> (usize, usize) {
-    let lo = (x.iter().copied().fold(f64::INFINITY, f64::min) - 0.5).ceil().clamp(0.0, w);
-    let hi = (x.iter().copied().fold(f64::NEG_INFINITY, f64::max) + 0.5).floor().clamp(0.0, w);
-    (lo as usize, hi as usize)
-}
-
-fn unproject(view: &View, w: usize, h: usize, x: usize, y: usize, q: f64) -> DVec3 {
-    let sx = ((x as f64 + 0.5) / w as f64 * 2.0 - 1.0) * view.half_width;
-    let sy = (1.0 - (y as f64 + 0.5) / h as f64 * 2.0) * view.half_height;
-    if view.is_perspective() {
-        view.eye + (view.forward + view.right * sx + view.up * sy) / q
-    } else {
-        view.eye + view.right * sx + view.up * sy - view.forward * q
-    }
-}
-
 /// What the sun sees.
 struct Sun {
     view: View,
@@ -289,7 +151,7 @@ struct Sun {
 
 impl Sun {
     fn new(scene: &Scene, style: &Style, looks: &[Look]) -> Sun {
-        let size = 2048;
+        let size = 4096;
         let bounds = scene.bounds();
         let (centre, reach) = (bounds.centre(), bounds.size().length().max(1e-3));
         let camera =
@@ -299,124 +161,21 @@ impl Sun {
         Sun { buffers: rasterise(scene, &view, size, size, &style, looks), view, size }
     }
 
-    fn lights(&self, p: DVec3) -> bool {
+    /// Share of the texels about a point that the sun reaches.
+    fn light(&self, p: DVec3) -> f64 {
         let c = self.view.to_camera(p);
-        let x = ((c.x / self.view.half_width * 0.5 + 0.5) * self.size as f64) as usize;
-        let y = ((0.5 - c.y / self.view.half_height * 0.5) * self.size as f64) as usize;
+        let x = (c.x / self.view.half_width * 0.5 + 0.5) * self.size as f64 - 0.5;
+        let y = (0.5 - c.y / self.view.half_height * 0.5) * self.size as f64 - 0.5;
         let texel = 2.0 * self.view.half_height / self.size as f64;
-        x >= self.size || y >= self.size || f64::from(self.buffers.q[y * self.size + x]) < -c.z + 2.5 * texel
-    }
-}
-
-/// A colour that stays with the material: by a word in its name if we know one,
-/// else from a wheel of muted tones.
-fn material_colour(scene: &Scene, material: u32) -> DVec3 {
-    const KNOWN: &[(&str, [u8; 3])] = &[
-        ("grass", [128, 148, 92]),
-        ("dirt", [166, 138, 104]),
-        ("snow", [228, 233, 238]),
-        ("rock", [142, 132, 122]),
-        ("sand", [205, 182, 140]),
-        ("water", [92, 138, 158]),
-        ("asphalt", [98, 100, 106]),
-        ("pavement", [176, 174, 168]),
-        ("concrete", [178, 174, 166]),
-        ("brick", [164, 96, 78]),
-        ("plaster", [222, 210, 188]),
-        ("wood", [150, 112, 74]),
-        ("plank", [172, 134, 92]),
-        ("metal", [126, 138, 148]),
-        ("rust", [158, 104, 70]),
-        ("roof", [122, 76, 66]),
-        ("slate", [88, 98, 112]),
-        ("glass", [150, 190, 205]),
-        ("foliage", [84, 118, 74]),
-        ("pine", [66, 98, 78]),
-        ("bark", [104, 80, 62]),
-        ("red", [184, 74, 64]),
-        ("blue", [82, 116, 164]),
-        ("coal", [58, 56, 58]),
-        ("tile", [196, 188, 176]),
-        ("carpet", [140, 92, 96]),
-        ("paper", [236, 230, 214]),
-        ("lamp", [246, 226, 160]),
-        ("trim", [112, 92, 74]),
-        ("hay", [212, 180, 98]),
-        ("fabric", [116, 136, 120]),
-        ("black", [52, 54, 58]),
-        ("gold", [214, 172, 72]),
-        ("white", [232, 230, 224]),
-        ("paint", [138, 154, 138]),
-    ];
-    let name = scene.material_names.get(material as usize).map(|n| n.to_lowercase()).unwrap_or_default();
-    if let Some((_, c)) = KNOWN.iter().filter(|(word, _)| name.contains(word)).max_by_key(|(word, _)| word.len()) {
-        return rgb(*c);
-    }
-    // Steps by the golden angle: neighbours in number are far apart in hue.
-    let hue = f64::from(material) * 2.399_963;
-    let wave = |shift: f64| 0.62 + 0.16 * libm::cos(hue + shift);
-    DVec3::new(wave(0.0), wave(-2.094), wave(2.094))
-}
-
-/// A perspective bird's-eye view that shows all of `bounds`: from the compass
-/// direction `azimuth_rad` (0 = from +x, counter-clockwise), `elevation_rad` above the horizon.
-pub fn overview(bounds: &Aabb, azimuth_rad: f64, elevation_rad: f64, aspect: f64) -> View {
-    let fov_y_rad = 35f64.to_radians();
-    let camera = Camera { projection: Projection::Perspective { fov_y_rad }, aspect, near_m: 0.01, far_m: None };
-    let back = DVec3::new(
-        libm::cos(azimuth_rad) * libm::cos(elevation_rad),
-        libm::sin(azimuth_rad) * libm::cos(elevation_rad),
-        libm::sin(elevation_rad),
-    );
-    let up = if elevation_rad.abs() > 1.5 { DVec3::Y } else { DVec3::Z };
-    let centre = bounds.centre();
-    let probe = View::new(&camera, &Pose { eye: centre, forward: -back, up });
-    let size = bounds.size();
-    // The least distance at which every corner of the box is within the view.
-    let distance = (0..8)
-        .map(|i| {
-            let pick = |bit: u32, s: f64| if i >> bit & 1 == 1 { s * 0.5 } else { -s * 0.5 };
-            let c = probe.to_camera(centre + DVec3::new(pick(0, size.x), pick(1, size.y), pick(2, size.z)));
-            (c.x.abs() / probe.half_width).max(c.y.abs() / probe.half_height) - c.z
-        })
-        .fold(0.0, f64::max);
-    View::new(&camera, &Pose { eye: centre + back * (distance * 1.02 + 1e-3), forward: -back, up })
-}
-
-/// An orthographic plan from straight above, +y up the page.
-pub fn plan(bounds: &Aabb, aspect: f64) -> View {
-    let size = bounds.size();
-    let height_m = size.y.max(size.x / aspect).max(1e-3) * 1.03;
-    let projection = Projection::Orthographic { height_m };
-    let camera = Camera { projection, aspect, near_m: 0.0, far_m: None };
-    let eye = bounds.centre() + DVec3::Z * (size.z * 0.5 + 1.0);
-    View::new(&camera, &Pose { eye, forward: -DVec3::Z, up: DVec3::Y })
-}
-
-/// Draws a polyline over `image`, unhidden by the scene: a walk on its map.
-pub fn draw_line(image: &mut Image, view: &View, points: &[DVec3], colour: [u8; 3]) {
-    let (w, h) = (f64::from(image.width), f64::from(image.height));
-    let pixel = |p: DVec3| {
-        let c = view.to_camera(p);
-        let weight = if view.is_perspective() { 1.0 / c.z } else { 1.0 };
-        let x = (c.x * weight / view.half_width * 0.5 + 0.5) * w;
-        let y = (0.5 - c.y * weight / view.half_height * 0.5) * h;
-        (c.z > view.camera.near_m).then_some((x, y))
-    };
-    for pair in points.windows(2) {
-        let (Some(a), Some(b)) = (pixel(pair[0]), pixel(pair[1])) else { continue };
-        let steps = (b.0 - a.0).abs().max((b.1 - a.1).abs()).ceil().clamp(1.0, w + h);
-        for i in 0..=steps as u32 {
-            let t = f64::from(i) / steps;
-            let (x, y) = (a.0 + (b.0 - a.0) * t, a.1 + (b.1 - a.1) * t);
-            for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-                let (x, y) = (x + dx, y + dy);
-                if x >= 0.0 && y >= 0.0 && x < w && y < h {
-                    let at = (y as usize * image.width as usize + x as usize) * 4;
-                    image.rgba[at..at + 3].copy_from_slice(&colour);
-                }
-            }
-        }
+        let reached = |dx: f64, dy: f64| {
+            let (x, y) = ((x.floor() + dx) as usize, (y.floor() + dy) as usize);
+            let within = x < self.size && y < self.size;
+            f64::from(!within || f64::from(self.buffers.q[y * self.size + x]) < -c.z + 2.5 * texel)
+        };
+        let (s, t) = (x - x.floor(), y - y.floor());
+        let low = reached(0.0, 0.0) * (1.0 - s) + reached(1.0, 0.0) * s;
+        let high = reached(0.0, 1.0) * (1.0 - s) + reached(1.0, 1.0) * s;
+        low * (1.0 - t) + high * t
     }
 }
 

@@ -200,6 +200,8 @@ pub fn time_trial(spec: &RunSpec, cache: &Path) -> Result<TrialRecord> {
     if protocol.passes == 0 {
         return Err(Error::new("a trial needs at least one timed pass").key("measure.passes"));
     }
+    // Before pinning, which would leave one core to count.
+    machine::core_count();
     if let Some(core) = protocol.pin_core {
         machine::pin_to(&[core])?;
     }

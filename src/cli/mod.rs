@@ -9,6 +9,7 @@ pub mod import;
 pub mod inspect;
 pub mod path;
 pub mod plan;
+pub mod progress;
 pub mod query;
 pub mod report;
 pub mod run;

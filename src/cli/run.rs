@@ -1,10 +1,278 @@
-//! `cullmark run`.
+//! `cullmark run`: manifest, matrix, queue, workers, results, report.
 
+use super::check;
+use super::progress::{Mode, Progress, json_line};
+use crate::error::Error;
+use crate::machine;
+use crate::manifest::Manifest;
+use crate::matrix::{self, Matrix, Setting};
+use crate::results::{RunStatus, StudyResults};
+use crate::store::{Cell, Detail, Store, Submission, Submitted};
+use crate::worker::child::Launcher;
+use crate::worker::{self, lane};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
+use tokio::sync::watch;
 
 #[derive(clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// TOML manifest of the study
+    manifest: PathBuf,
+    /// Lay key=value over the manifest, such as measure.repeats=3 (repeatable)
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Database of results
+    #[arg(long, value_name = "FILE", default_value = crate::store::DEFAULT_DB)]
+    db: PathBuf,
+    /// Folder of the report (default: beside the database, named as the study)
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Measure again under the next number, or go on with a given one
+    #[arg(long, value_name = "next|N")]
+    series: Option<String>,
+    /// Workers beside the measuring lane (default: one a spare core)
+    #[arg(long, value_name = "N")]
+    workers: Option<usize>,
+    /// Parsed scenes and ground truth are kept here (default: beside the database)
+    #[arg(long, value_name = "DIR")]
+    cache_dir: Option<PathBuf>,
+    /// Try again what failed before
+    #[arg(long)]
+    retry_failed: bool,
+    /// Leave the report out
+    #[arg(long)]
+    no_report: bool,
+    /// No progress, only what went wrong
+    #[arg(long, short)]
+    quiet: bool,
+    /// One JSON object a line on standard output
+    #[arg(long)]
+    json: bool,
+}
 
-pub fn run(_args: Args) -> anyhow::Result<ExitCode> {
-    anyhow::bail!("not built yet")
+/// Interrupted by Ctrl-C, as shells count it.
+const INTERRUPTED: u8 = 130;
+
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let manifest = match Manifest::load(&args.manifest, &args.set) {
+        Ok(manifest) => manifest,
+        Err(errors) => return Ok(mistakes(&errors, args.json)),
+    };
+    // Counted and left before any thread starts: threads inherit where they may run.
+    let launcher = Launcher::here()?;
+    let machine_class = machine::environment(None).machine_class;
+    launcher.leave_the_lane();
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+    runtime.block_on(study(&args, &manifest, launcher, machine_class))
+}
+
+/// The part of every run that the machine decides. `plan` needs the same for the same ids.
+pub fn setting(series: u32) -> Setting {
+    Setting {
+        pin_core: machine::measuring_core(),
+        build_profile: machine::build_profile().to_string(),
+        isa: machine::isa().to_string(),
+        threads: 1,
+        series,
+    }
+}
+
+fn mistakes(errors: &[Error], json: bool) -> ExitCode {
+    check::print_errors(errors, json);
+    ExitCode::from(2)
+}
+
+async fn study(
+    args: &Args,
+    manifest: &Manifest,
+    launcher: Launcher,
+    machine_class: String,
+) -> anyhow::Result<ExitCode> {
+    let auxiliary = worker::auxiliary_workers(args.workers, launcher.cores)?;
+    let store = Store::open(&args.db).await?;
+    let series = series(args, &store, &manifest.study.name).await?;
+    // The lane's core was counted by the launcher, before this process left it.
+    let setting = Setting { pin_core: launcher.lane_core, ..setting(series) };
+    let matrix = match matrix::expand(manifest, &setting) {
+        Ok(matrix) => matrix,
+        Err(errors) => return Ok(mistakes(&errors, args.json)),
+    };
+    let submitted = store.submit(&submission(args, manifest, &matrix, machine_class, series)).await?;
+    let mode = match (args.json, args.quiet) {
+        (true, _) => Mode::Json,
+        (_, true) => Mode::Quiet,
+        _ => Mode::Bar,
+    };
+    announce(mode, manifest, &matrix, &submitted, series);
+
+    let progress = Arc::new(Progress::new(mode, &submitted, auxiliary));
+    let folder = args.db.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_path_buf();
+    let options = worker::Options {
+        launcher,
+        cache_dir: args.cache_dir.clone().unwrap_or_else(|| folder.join("cache")),
+        lane_file: lane::default_path(),
+        auxiliary,
+    };
+    let tell = {
+        let progress = progress.clone();
+        Arc::new(move |event| progress.on(&event))
+    };
+    let stop = stop_on_signal();
+    let stopped = worker::work(&store, submitted.study_id, &manifest.repeat, &options, tell, stop).await;
+    progress.end();
+    let stopped = stopped?;
+
+    let name = format!("{}@{series}", manifest.study.name);
+    let detail = if args.no_report || stopped { Detail::Summary } else { Detail::Frames };
+    let results = store.results_with(&name, detail).await?;
+    let mut page = None;
+    if !args.no_report && !stopped {
+        let shown = if series == 0 { manifest.study.name.clone() } else { name };
+        let out = args.out.clone().unwrap_or_else(|| folder.join(shown));
+        let files = crate::report::write(&results, &manifest.claims(), &out)?;
+        store.record_artifacts(submitted.study_id, &out).await?;
+        page = Some(files.page);
+    }
+    store.close().await;
+    Ok(conclude(mode, &results, stopped, page.as_deref()))
+}
+
+async fn series(args: &Args, store: &Store, study: &str) -> anyhow::Result<u32> {
+    Ok(match args.series.as_deref() {
+        None => 0,
+        Some("next") => store.next_series(study).await?,
+        Some(text) => text.parse().map_err(|_| {
+            Error::new(format!("`--series {text}` is neither `next` nor a number"))
+                .help("`--series next` measures the whole study again beside what is stored")
+        })?,
+    })
+}
+
+fn submission(args: &Args, manifest: &Manifest, matrix: &Matrix, machine_class: String, series: u32) -> Submission {
+    let cell = |spec: &crate::record::RunSpec| {
+        let labels = matrix::labels(spec);
+        Cell { spec: spec.clone(), structure: labels.structure, culling: labels.culling, walk: labels.walk }
+    };
+    Submission {
+        name: manifest.study.name.clone(),
+        title: manifest.study.title.clone(),
+        manifest_toml: manifest.source_text.clone(),
+        claims_json: serde_json::to_string(&manifest.claims()).expect("claims are plain data"),
+        consolidate_frames: manifest.timing.consolidate_frames,
+        policy: manifest.repeat.clone(),
+        machine_class,
+        series,
+        cells: matrix.runs.iter().map(cell).collect(),
+        excluded: matrix.excluded.clone(),
+        retry_failed: args.retry_failed,
+    }
+}
+
+fn announce(mode: Mode, manifest: &Manifest, matrix: &Matrix, s: &Submitted, series: u32) {
+    let study = &manifest.study;
+    match mode {
+        Mode::Quiet => {}
+        Mode::Json => json_line(&serde_json::json!({
+            "event": "submitted", "study": study.name, "series": series, "runs": s.runs, "new": s.new,
+            "resumed": s.resumed, "done": s.done, "failed": s.failed, "wrong": s.wrong,
+            "excluded": matrix.excluded_runs.len(), "jobs_added": s.jobs_added,
+        })),
+        Mode::Bar => {
+            eprintln!(
+                "{} ({}{})",
+                study.title,
+                study.name,
+                if series > 0 { format!("@{series}") } else { String::new() }
+            );
+            let parts = [
+                (s.new, "new"),
+                (s.resumed, "to go on with"),
+                (s.done, "already done"),
+                (s.failed, "failed before (--retry-failed tries again)"),
+                (s.wrong, "wrong"),
+                (matrix.excluded_runs.len() as u64, "excluded"),
+            ];
+            let parts: Vec<String> = parts.iter().filter(|p| p.0 > 0).map(|(n, what)| format!("{n} {what}")).collect();
+            eprintln!("{} runs: {}", s.runs, parts.join(", "));
+        }
+    }
+}
+
+/// True after the first Ctrl-C or termination request; a second one ends the
+/// process at once (children die with it, leases are returned at the next start).
+fn stop_on_signal() -> watch::Receiver<bool> {
+    let (sender, receiver) = watch::channel(false);
+    tokio::spawn(async move {
+        let mut asked = 0;
+        loop {
+            #[cfg(unix)]
+            {
+                use tokio::signal::unix::{SignalKind, signal};
+                let Ok(mut terminate) = signal(SignalKind::terminate()) else { return };
+                tokio::select! {
+                    _ = tokio::signal::ctrl_c() => {}
+                    _ = terminate.recv() => {}
+                }
+            }
+            #[cfg(not(unix))]
+            if tokio::signal::ctrl_c().await.is_err() {
+                return;
+            }
+            asked += 1;
+            if asked > 1 {
+                std::process::exit(i32::from(INTERRUPTED));
+            }
+            eprintln!("stopping: what is finished is kept (again to stop at once)");
+            let _ = sender.send(true);
+        }
+    });
+    receiver
+}
+
+fn conclude(mode: Mode, results: &StudyResults, stopped: bool, page: Option<&Path>) -> ExitCode {
+    let count = |status| results.runs.iter().filter(|r| r.status == status).count();
+    let (done, failed, wrong, pending) =
+        (count(RunStatus::Done), count(RunStatus::Failed), count(RunStatus::Wrong), count(RunStatus::Pending));
+    if mode == Mode::Json {
+        json_line(&serde_json::json!({
+            "event": "finished", "stopped": stopped, "done": done, "failed": failed, "wrong": wrong,
+            "pending": pending, "report": page,
+        }));
+    } else {
+        problems(results);
+        if mode == Mode::Bar || stopped {
+            let mut line = format!("{done} of {} runs done", results.runs.len());
+            for (n, what) in [(failed, "failed"), (wrong, "wrong"), (pending, "not finished")] {
+                if n > 0 {
+                    line += &format!(", {n} {what}");
+                }
+            }
+            eprintln!("{line}");
+            if stopped {
+                eprintln!("start it again to go on");
+            }
+        }
+        if let (Some(page), Mode::Bar) = (page, mode) {
+            println!("report: {}", page.display());
+        }
+    }
+    match (stopped, failed + wrong + pending) {
+        (true, _) => ExitCode::from(INTERRUPTED),
+        (_, 0) => ExitCode::SUCCESS,
+        _ => ExitCode::from(1),
+    }
+}
+
+/// Every failed or wrong run with its reason.
+fn problems(results: &StudyResults) {
+    let bad: Vec<_> =
+        results.runs.iter().filter(|r| matches!(r.status, RunStatus::Failed | RunStatus::Wrong)).collect();
+    let width = bad.iter().map(|r| r.scene().chars().count() + r.label().chars().count() + 2).max().unwrap_or(0);
+    for r in bad {
+        let word = if r.status == RunStatus::Wrong { "wrong " } else { "failed" };
+        let name = format!("{}: {}", r.scene(), r.label());
+        let reason = r.reason.as_deref().unwrap_or("no reason is known").replace('\n', "\n    ");
+        eprintln!("{word}  {name:width$}  {reason}");
+    }
 }

@@ -56,6 +56,7 @@ impl Walk for DepthFirst {
                 out.push(first, own_end);
                 let live = hierarchy.links[child as usize].live;
                 self.descent.enter(hierarchy, child, live, 0, tests, Some(at), tally);
+                self.descent.expect_children(hierarchy);
             }
         }
     }

@@ -64,6 +64,25 @@ impl Descent {
         self.frames.push(Frame { block, rest: left | also, kept: left });
     }
 
+    /// Asks for the blocks below the lanes on top of the stack: they lie anywhere in
+    /// memory, and arrive while their elder siblings are judged.
+    pub fn expect_children(&self, hierarchy: &Hierarchy) {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(top) = self.frames.last() {
+            let mut rest = top.rest;
+            while rest != 0 {
+                let child = hierarchy.links[top.block as usize].child[rest.trailing_zeros() as usize];
+                rest &= rest - 1;
+                if child != NONE {
+                    super::prefetch_x86::prefetch(&hierarchy.bounds[child as usize]);
+                    super::prefetch_x86::prefetch(&hierarchy.links[child as usize]);
+                }
+            }
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        let _ = hierarchy;
+    }
+
     /// The next lane in order of positions, if one is left.
     pub fn next(&mut self, test_count: usize) -> Option<Visit> {
         loop {

@@ -15,7 +15,7 @@
 use super::frustum_planes::{FramePlanes, PlaneMasks, Work};
 use super::frustum_volume::Volume;
 use super::*;
-use crate::hierarchy::{BoundsBlock, HalfSpace, LANES};
+use crate::hierarchy::{BoundsBlock, HalfSpace, LANES, NONE};
 use crate::registry::{Default as Allowed, Param};
 
 pub const ENTRY: Entry<dyn Test> = Entry {
@@ -133,8 +133,16 @@ impl Frustum {
     }
 
     /// Lanes of `alive` that no plane of `wanted` rejects, in index order.
-    fn in_order(&self, bounds: &BoundsBlock, wanted: u8, alive: u8, masks: &mut PlaneMasks, tally: &mut Tally) -> u8 {
-        (self.kernels.block)(&self.frame, bounds, wanted, true, masks);
+    fn in_order(
+        &self,
+        bounds: &BoundsBlock,
+        wanted: u8,
+        alive: u8,
+        want_inside: bool,
+        masks: &mut PlaneMasks,
+        tally: &mut Tally,
+    ) -> u8 {
+        (self.kernels.block)(&self.frame, bounds, wanted, want_inside, masks);
         let mut alive = alive;
         for k in bits(wanted) {
             tally.plane_tests += u64::from(alive.count_ones());
@@ -150,6 +158,7 @@ impl Frustum {
         block: usize,
         wanted: u8,
         alive: u8,
+        want_inside: bool,
         masks: &mut PlaneMasks,
         tally: &mut Tally,
     ) -> u8 {
@@ -157,7 +166,7 @@ impl Frustum {
         let first = bits(wanted).filter(|k| last[*k] & alive != 0).fold(0, |m, k| m | 1 << k);
         let mut alive = alive;
         if first != 0 {
-            (self.kernels.block)(&self.frame, bounds, first, true, masks);
+            (self.kernels.block)(&self.frame, bounds, first, want_inside, masks);
             for k in bits(first) {
                 tally.plane_tests += u64::from((alive & last[k]).count_ones());
                 alive &= !(masks.outside[k] & last[k]);
@@ -166,7 +175,7 @@ impl Frustum {
                 return 0;
             }
         }
-        (self.kernels.block)(&self.frame, bounds, wanted & !first, true, masks);
+        (self.kernels.block)(&self.frame, bounds, wanted & !first, want_inside, masks);
         for k in bits(wanted) {
             let tested = alive & !last[k];
             tally.plane_tests += u64::from(tested.count_ones());
@@ -209,6 +218,10 @@ impl Test for Frustum {
         size_of_val(&self.live[..]) + size_of_val(&self.last[..])
     }
 
+    fn reset(&mut self) {
+        self.last.fill([0; 6]);
+    }
+
     fn begin(&mut self, view: &View, hierarchy: &Hierarchy) {
         self.frame = FramePlanes::new(view, hierarchy.origin);
         self.with_planes = self.node_test != NodeTest::Box && hierarchy.half_spaces.is_some();
@@ -229,10 +242,12 @@ impl Test for Frustum {
         if self.with_boxes {
             let mut masks = PlaneMasks::default();
             let bounds = &hierarchy.bounds[block as usize];
+            // Nobody inherits what a block of leaves is inside of.
+            let want_inside = hierarchy.links[block as usize].child.iter().any(|c| *c != NONE);
             alive = if self.last_plane {
-                self.last_first(bounds, block as usize, carry, alive, &mut masks, tally)
+                self.last_first(bounds, block as usize, carry, alive, want_inside, &mut masks, tally)
             } else {
-                self.in_order(bounds, carry, alive, &mut masks, tally)
+                self.in_order(bounds, carry, alive, want_inside, &mut masks, tally)
             };
             carries = planes_left(&masks, carry, self.plane_mask);
         }

@@ -24,11 +24,11 @@ impl Volume {
             if view.is_perspective() { rays[i] * depth } else { window[i] + view.forward * depth }
         };
         let mut volume = Volume { eye: view.eye - origin, ..Default::default() };
-        for i in 0..4 {
+        for (i, ray) in rays.iter().enumerate() {
             volume.points.push(corner(i, view.camera.near_m));
             match view.camera.far_m {
                 Some(far_m) => volume.points.push(corner(i, far_m)),
-                None => volume.directions.push(rays[i]),
+                None => volume.directions.push(*ray),
             }
         }
         volume

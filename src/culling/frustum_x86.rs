@@ -58,12 +58,13 @@ pub fn flat_avx512(frame: &FramePlanes, bounds: &[BoundsBlock], live: &[u8], out
     }
 }
 
-/// 8 boxes relative to the eye, and the guard of each.
+/// 8 boxes relative to the eye, and the guard of each. Two of the eight registers are
+/// there only so that an index of three bits needs no check.
 #[target_feature(enable = "avx2")]
 #[inline]
-fn relative_256(eye: &[__m256; 3], bounds: &BoundsBlock) -> ([__m256; 6], __m256) {
+fn relative_256(eye: &[__m256; 3], bounds: &BoundsBlock) -> ([__m256; 8], __m256) {
     let positive = _mm256_castsi256_ps(_mm256_set1_epi32(0x7fff_ffff));
-    let mut a = [_mm256_setzero_ps(); 6];
+    let mut a = [_mm256_setzero_ps(); 8];
     let mut magnitude = [_mm256_setzero_ps(); 3];
     for axis in 0..3 {
         // SAFETY: a row of 8 f32 is 32 bytes, and rows are 32-byte aligned in the 64-byte aligned block.
@@ -80,10 +81,10 @@ fn relative_256(eye: &[__m256; 3], bounds: &BoundsBlock) -> ([__m256; 6], __m256
 
 #[target_feature(enable = "avx2")]
 #[inline]
-fn value_256(normal: &[f32; 3], a: &[__m256; 6], corner: &[usize; 3], d: f32) -> __m256 {
-    let x = _mm256_mul_ps(_mm256_set1_ps(normal[0]), a[corner[0]]);
-    let y = _mm256_mul_ps(_mm256_set1_ps(normal[1]), a[corner[1]]);
-    let z = _mm256_mul_ps(_mm256_set1_ps(normal[2]), a[corner[2]]);
+fn value_256(normal: &[f32; 3], a: &[__m256; 8], corner: &[usize; 3], d: f32) -> __m256 {
+    let x = _mm256_mul_ps(_mm256_set1_ps(normal[0]), a[corner[0] & 7]);
+    let y = _mm256_mul_ps(_mm256_set1_ps(normal[1]), a[corner[1] & 7]);
+    let z = _mm256_mul_ps(_mm256_set1_ps(normal[2]), a[corner[2] & 7]);
     _mm256_add_ps(_mm256_add_ps(_mm256_add_ps(x, y), z), _mm256_set1_ps(d))
 }
 
@@ -150,7 +151,7 @@ fn flat_512<const N: usize>(frame: &FramePlanes, bounds: &[BoundsBlock], live: &
         // An odd last block is judged beside itself, with no lane of the copy alive.
         let second = (at + 1).min(count - 1);
         let (first_block, second_block) = (&bounds[at], &bounds[second]);
-        let mut a = [_mm512_setzero_ps(); 6];
+        let mut a = [_mm512_setzero_ps(); 8];
         let mut magnitude = [_mm512_setzero_ps(); 3];
         for axis in 0..3 {
             let lo = _mm512_sub_ps(load_pair(&first_block.lo[axis], &second_block.lo[axis]), eye[axis]);
@@ -168,9 +169,9 @@ fn flat_512<const N: usize>(frame: &FramePlanes, bounds: &[BoundsBlock], live: &
         work.lanes += u64::from(left.count_ones());
         for plane in &frame.planes[..N] {
             work.planes += u64::from(left.count_ones());
-            let x = _mm512_mul_ps(_mm512_set1_ps(plane.normal[0]), a[plane.p[0]]);
-            let y = _mm512_mul_ps(_mm512_set1_ps(plane.normal[1]), a[plane.p[1]]);
-            let z = _mm512_mul_ps(_mm512_set1_ps(plane.normal[2]), a[plane.p[2]]);
+            let x = _mm512_mul_ps(_mm512_set1_ps(plane.normal[0]), a[plane.p[0] & 7]);
+            let y = _mm512_mul_ps(_mm512_set1_ps(plane.normal[1]), a[plane.p[1] & 7]);
+            let z = _mm512_mul_ps(_mm512_set1_ps(plane.normal[2]), a[plane.p[2] & 7]);
             let s = _mm512_add_ps(_mm512_add_ps(_mm512_add_ps(x, y), z), _mm512_set1_ps(plane.d_out));
             left &= !u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(s, below));
         }

@@ -12,6 +12,8 @@ pub mod frustum_volume;
 pub mod frustum_x86;
 pub mod normal_mask;
 pub mod octant_mask;
+#[cfg(target_arch = "x86_64")]
+mod prefetch_x86;
 
 use crate::error::Result;
 use crate::hierarchy::Hierarchy;
@@ -192,8 +194,11 @@ pub static TESTS: &[Entry<dyn Test>] = &[frustum::ENTRY, normal_mask::ENTRY, oct
 /// Sorted by name.
 pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, flat::ENTRY];
 
+/// The parts of a sum, made, and their resolved specs.
+pub type Sum = (Vec<Box<dyn Test>>, Vec<Spec>);
+
 /// The tests that `specs` name, in order, with defaults filled in.
-pub fn make_tests(specs: &[Spec]) -> Result<(Vec<Box<dyn Test>>, Vec<Spec>)> {
+pub fn make_tests(specs: &[Spec]) -> Result<Sum> {
     let mut tests = Vec::new();
     let mut resolved = Vec::new();
     for spec in specs {

@@ -29,6 +29,7 @@ use super::*;
 use crate::hierarchy::{LANES, NONE};
 use crate::math::DVec3;
 use crate::registry::{Default as Allowed, Param};
+use rayon::prelude::*;
 
 pub const ENTRY: Entry<dyn Test> = Entry {
     name: "normal_mask",
@@ -145,7 +146,11 @@ impl Test for NormalMask {
 
     fn prepare(&mut self, scene: &Scene, hierarchy: &Hierarchy) -> usize {
         let words = self.cells.words();
-        let cell: Vec<u16> = (0..scene.len() as u32).map(|t| self.cells.of_triangle(scene, t) as u16).collect();
+        let cell: Vec<u16> = (0..scene.len() as u32)
+            .into_par_iter()
+            .with_min_len(4096)
+            .map(|t| self.cells.of_triangle(scene, t) as u16)
+            .collect();
         self.masks = vec![[0; LANES]; hierarchy.links.len() * words];
         let masks = &mut self.masks;
         super::descent::bottom_up(hierarchy, |block, lane| {

@@ -19,6 +19,7 @@ use super::*;
 use crate::hierarchy::{LANES, NONE};
 use crate::math::DVec3;
 use crate::registry::{Default as Allowed, Param};
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 pub const ENTRY: Entry<dyn Test> = Entry {
@@ -84,11 +85,13 @@ impl Test for OctantMask {
     }
 
     fn prepare(&mut self, scene: &Scene, hierarchy: &Hierarchy) -> usize {
+        let own_mask: Vec<u16> =
+            (0..scene.len() as u32).into_par_iter().with_min_len(4096).map(|t| self.of_triangle(scene, t)).collect();
         let mut masks = vec![[0; LANES]; hierarchy.links.len()];
         super::descent::bottom_up(hierarchy, |block, lane| {
             let links = &hierarchy.links[block];
             let own = &hierarchy.entries[links.first[lane] as usize..links.own_end[lane] as usize];
-            let mut mask = own.iter().fold(0, |m, t| m | self.of_triangle(scene, *t));
+            let mut mask = own.iter().fold(0, |m, t| m | own_mask[*t as usize]);
             if links.child[lane] != NONE {
                 mask |= masks[links.child[lane] as usize].iter().fold(0, |m, b| m | b);
             }

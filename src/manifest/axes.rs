@@ -7,8 +7,9 @@ use super::ranges;
 use super::source::{Mistakes, Place};
 use super::tree::{Data, Node, get};
 use crate::error::{Error, Result, did_you_mean};
-use crate::registry::{Entry, Param, Spec, Value, find, parse_sum};
+use crate::registry::{Entry, Param, Spec, Value, find, format_sum, parse_sum};
 use crate::{culling, structure};
+use std::collections::HashSet;
 
 /// An axis other than `scene` and `path`, whose values are the manifest's own.
 pub struct Axis {
@@ -32,7 +33,7 @@ pub struct Part {
     pub params: &'static [Param],
 }
 
-fn parts<T: ?Sized>(entries: &'static [Entry<T>]) -> Vec<Part> {
+pub fn parts<T: ?Sized>(entries: &'static [Entry<T>]) -> Vec<Part> {
     entries.iter().map(|e| Part { name: e.name, revision: e.revision, params: e.params }).collect()
 }
 
@@ -104,12 +105,13 @@ pub struct AxisValues {
 /// Expands the entries of one axis. Mistakes are noted; equal values are kept once.
 pub fn read_values(mistakes: &Mistakes, key: &str, axis: &'static Axis, nodes: &[Node]) -> AxisValues {
     let mut out = AxisValues { axis: axis.name, values: Vec::new(), repeated: 0 };
+    let mut seen = HashSet::new();
     for node in nodes {
         for value in read_entry(mistakes, key, axis, node) {
-            if out.values.contains(&value) {
-                out.repeated += 1;
-            } else {
+            if seen.insert(format_sum(&value)) {
                 out.values.push(value);
+            } else {
+                out.repeated += 1;
             }
         }
     }

@@ -38,7 +38,7 @@ impl<'a> Fields<'a> {
     }
 
     pub fn entry(&mut self, name: &'static str) -> Option<&'a (Key, Node)> {
-        self.known.push(name);
+        self.known(name);
         self.table.iter().find(|(k, _)| k.name == name)
     }
 
@@ -110,7 +110,7 @@ impl<'a> Fields<'a> {
     /// A string that is not blank.
     pub fn sentence(&mut self, name: &'static str, help: &str) -> Option<String> {
         if !self.has(name) {
-            self.known.push(name);
+            self.known(name);
             self.missing(name, help);
             return None;
         }
@@ -200,7 +200,9 @@ impl<'a> Fields<'a> {
     }
 
     pub fn known(&mut self, name: &'static str) {
-        self.known.push(name);
+        if !self.known.contains(&name) {
+            self.known.push(name);
+        }
     }
 
     /// Notes every key that nobody asked for.

@@ -152,7 +152,9 @@ fn put_node(node: &mut Node, named: &Key, rest: &[Key], value: Node) -> Result<(
             let at = element(items, next).ok_or_else(|| {
                 let mut e = Error::new(format!("`{}` has no entry `{}`", named.name, next.name));
                 let names: Vec<&str> = items.iter().filter_map(name_of).collect();
-                e.help = Some(match did_you_mean(&next.name, names.iter().copied()) {
+                let number = next.name.bytes().all(|b| b.is_ascii_digit());
+                let near = did_you_mean(&next.name, names.iter().copied()).filter(|_| !number);
+                e.help = Some(match near {
                     Some(near) => format!("did you mean `{near}`?"),
                     None if items.is_empty() => "the list is empty".to_string(),
                     None if names.is_empty() => format!("entries are numbered 0 to {}", items.len() - 1),

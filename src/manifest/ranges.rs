@@ -62,6 +62,7 @@ fn range(f: &mut Fields, param: &Param) -> Vec<Value> {
         Default::Int { .. } => true,
         Default::Float { .. } => false,
         _ => {
+            ["from", "to", "steps", "step", "scale"].into_iter().for_each(|name| f.known(name));
             let e = Error::new("takes no range: it is not a number");
             f.note(&f.place.clone(), "", e.help("give a list of values"));
             return Vec::new();

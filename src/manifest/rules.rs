@@ -61,9 +61,9 @@ impl Matrix {
     /// The paths that the `path` axis keeps. A scene left without one is a mistake.
     pub fn keep_paths(&self, m: &Mistakes, mut paths: Vec<Vec<PathSpec>>, scenes: &[SceneSpec]) -> Vec<Vec<PathSpec>> {
         let Some((keep, place)) = &self.paths else { return paths };
-        for (scene, list) in scenes.iter().zip(&mut paths) {
+        for (i, (scene, list)) in scenes.iter().zip(&mut paths).enumerate() {
             list.retain(|p| keep.contains(&p.name));
-            if list.is_empty() && m.is_empty() {
+            if list.is_empty() && m.is_empty() && self.scene_axis.contains(&i) {
                 let e = Error::new(format!("leaves the scene `{}` without a path", scene.name));
                 m.note(place, "matrix.path", e.help("name a path that applies to it, or leave the scene out"));
             }

@@ -89,14 +89,6 @@ fn scene(mut f: Fields, name: Option<String>) -> Option<SceneSpec> {
     let up = f.choice("up", &[("y", Up::Y), ("z", Up::Z)]).unwrap_or(if generated { Up::Z } else { Up::Y });
     let scale = f.number("scale", "metres a unit, above 0", |x| x > 0.0 && x.is_finite()).unwrap_or(1.0);
     let weld = f.bool("weld").unwrap_or(false);
-    if generated {
-        for option in ["winding", "up", "scale"] {
-            if let Some(node) = f.get(option) {
-                let e = Error::new("does not apply to a generated scene");
-                f.note(&node.place, option, e.help("remove it: generators work in metres, z up, counter-clockwise"));
-            }
-        }
-    }
     let place = f.place.clone();
     let mistakes = f.mistakes;
     let key = f.path.clone();

@@ -119,7 +119,7 @@ fn mismatch(default: &Default, value: &Value) -> Option<String> {
         (Default::Float { min, max, .. }, _) => Some(format!("it is a number from {min} to {max}")),
         (Default::Bool(_), Value::Bool(_)) => None,
         (Default::Bool(_), _) => Some("it is true or false".into()),
-        (Default::Choice(c), Value::Text(s)) if c.contains(&s.as_str()) => None,
+        (Default::Choice(c), _) if c.contains(&value.to_string().as_str()) => None,
         (Default::Choice(c), _) => Some(format!("it is one of {}", c.join(", "))),
     }
 }

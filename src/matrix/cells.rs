@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::manifest::axes::{AXES, AxisValue};
 use crate::manifest::source::Mistakes;
 use crate::manifest::{Include, Manifest};
-use crate::registry::Spec;
+use crate::registry::{Spec, Value};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// One cell: scene and path by number, axis values by number in the [`Pool`].
@@ -222,18 +222,21 @@ impl Block {
     }
 }
 
-/// A combination that cannot run, known before any structure is built.
+/// A combination that cannot be what it says, known before anything is built.
 struct Impossible {
-    /// Whether it strikes structure, culling and walk.
-    strikes: fn(&Spec, &[Spec], &Spec) -> bool,
+    /// The part to blame, for structure, culling and walk.
+    strikes: fn(&Spec, &[Spec], &Spec) -> Option<Spec>,
     why: &'static str,
     help: &'static str,
 }
 
 static IMPOSSIBLE: &[Impossible] = &[Impossible {
-    strikes: |structure, _, walk| walk.kind == "flat" && structure.kind != "list",
-    why: "the walk `flat` judges root blocks only and needs a structure without levels",
-    help: "walk = \"auto\" takes the fitting walk",
+    strikes: |structure, culling, _| {
+        let by_plane = |s: &&Spec| matches!(s.params.get("node_test"), Some(Value::Text(t)) if t != "box");
+        culling.iter().find(by_plane).filter(|_| structure.kind != "bsp").cloned()
+    },
+    why: "only `bsp` has partition planes for `node_test` to judge by",
+    help: "keep node_test = \"box\" for other structures",
 }];
 
 /// Notes every kind of impossible cell once, with an exclude that would silence it.
@@ -241,21 +244,24 @@ pub fn impossible(manifest: &Manifest, pool: &Pool, cells: &[Cell], mistakes: &M
     let position = |name: &str| AXES.iter().position(|a| a.name == name).expect("a known axis");
     let (s, c, w) = (position("structure"), position("culling"), position("walk"));
     for rule in IMPOSSIBLE {
-        let strikes = |cell: &&Cell| {
-            let value = |i: usize| pool.value(cell.values[i]);
-            (rule.strikes)(&value(s)[0], value(c), &value(w)[0])
-        };
-        let struck: Vec<&Cell> = cells.iter().filter(strikes).collect();
-        let Some(first) = struck.first() else { continue };
-        let kind = |i: usize| pool.value(first.values[i])[0].kind.clone();
-        let e =
-            Error::new(format!("{} impossible cells, such as {} × {}: {}", struck.len(), kind(s), kind(w), rule.why));
-        let help = format!(
-            "{}; or add [[exclude]] structure = \"{}\", walk = \"{}\", why = \"...\"",
-            rule.help,
-            kind(s),
-            kind(w)
+        let value = |cell: &Cell, i: usize| pool.value(cell.values[i]).clone();
+        let strike = |cell: &Cell| (rule.strikes)(&value(cell, s)[0], &value(cell, c), &value(cell, w)[0]);
+        let struck: Vec<(&Cell, Spec)> = cells.iter().filter_map(|cell| Some((cell, strike(cell)?))).collect();
+        let Some((first, part)) = struck.first() else { continue };
+        let cell = format!(
+            "{} × {}",
+            super::labels::label("structure", &value(first, s)),
+            super::labels::label("culling", &value(first, c))
         );
-        mistakes.note(&manifest.matrix_place, "matrix", e.help(help));
+        let many =
+            if struck.len() == 1 { "an impossible cell".into() } else { format!("{} impossible cells", struck.len()) };
+        let e = Error::new(format!("has {many}, such as {cell}: {}", rule.why));
+        let kind = &value(first, s)[0].kind;
+        let exclude = format!("structure = \"{kind}\", culling = \"{}:node_test!=box+*\"", part.kind);
+        mistakes.note(
+            &manifest.matrix_place,
+            "matrix",
+            e.help(format!("{}; or add [[exclude]] with {exclude} and why = \"...\"", rule.help)),
+        );
     }
 }

@@ -34,6 +34,16 @@ impl Submitted {
 /// How many lost ids a record names.
 const NAMED: usize = 8;
 
+/// A judgement with every lost triangle, ascending.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Losses {
+    pub errors: FrameErrors,
+    /// Missing in the picture.
+    pub seen: Vec<u32>,
+    /// Owed and missing, though hidden from every sample.
+    pub hidden: Vec<u32>,
+}
+
 /// Judges what was submitted for `view`. `submitted_entries` is the number of
 /// distinct triangles; callers that submit duplicates raise it.
 ///
@@ -49,6 +59,11 @@ pub fn judge_frame(
     submitted: &Submitted,
     removes: Removes,
 ) -> FrameErrors {
+    losses(scene, view, truth, submitted, removes).errors
+}
+
+/// [`judge_frame`] with all that was lost.
+pub fn losses(scene: &Scene, view: &View, truth: &FrameTruth, submitted: &Submitted, removes: Removes) -> Losses {
     let standings = truth.standings();
     assert_eq!(standings.len(), scene.len(), "truth of this scene");
     assert_eq!(submitted.triangles.len(), scene.len(), "a bit for every triangle");
@@ -82,22 +97,25 @@ pub fn judge_frame(
     }
 
     let count = submitted.triangles.count();
-    let hidden = potential_lost.difference(&seen_lost);
-    FrameErrors {
+    let seen: Vec<u32> = seen_lost.iter().copied().collect();
+    let hidden: Vec<u32> = potential_lost.difference(&seen_lost).copied().collect();
+    // What is missed in the picture first, then what is missing behind it.
+    let named = seen.iter().chain(&hidden).take(NAMED);
+    let errors = FrameErrors {
         frame: truth.frame,
         submitted: count,
         submitted_entries: count,
         visible: truth.visible.len() as u64,
         potential,
-        false_culls: seen_lost.len() as u64,
+        false_culls: seen.len() as u64,
         potential_lost: potential_lost.len() as u64,
         false_cull_pixels: image.lost.count(),
         covered_pixels: truth.covered_pixels,
         pixels: u64::from(truth.grid.width_px) * u64::from(truth.grid.height_px),
         largest_blob_px: image.largest_blob(),
-        // What is missed in the picture first, then what is missing behind it.
-        lost_ids: seen_lost.iter().chain(hidden).take(NAMED).map(|t| scene.source_triangle_id[*t as usize]).collect(),
-    }
+        lost_ids: named.map(|t| scene.source_triangle_id[*t as usize]).collect(),
+    };
+    Losses { errors, seen, hidden }
 }
 
 /// Unsubmitted pieces of partly submitted triangles that the method owes.

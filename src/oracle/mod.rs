@@ -21,7 +21,7 @@ pub mod volume;
 
 pub use bits::BitSet;
 pub use cache::truth_cached;
-pub use judge::{Submitted, judge_frame, verdict};
+pub use judge::{Losses, Submitted, judge_frame, losses, verdict};
 
 use crate::math::{Camera, Pose, View};
 use crate::record::Accuracy;

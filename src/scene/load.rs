@@ -43,7 +43,8 @@ pub fn fingerprint(source: &SceneSource, winding: Winding, up: Up, scale: f64, w
             }
         }
         SceneSource::Generated(spec) => {
-            let (entry, resolved) = registry::find("scene generator", generate::ALL, spec)?;
+            let (_, resolved) = generate::make(spec)?;
+            let (entry, _) = registry::find("generator", generate::ALL, &resolved)?;
             part(resolved.to_string().as_bytes());
             part(&entry.revision.to_le_bytes());
         }

@@ -54,7 +54,8 @@ pub struct LoadReport {
     /// glTF points and lines: counted and left out.
     pub points_and_lines: u64,
     pub vertices_welded: u64,
-    /// Share of first hits of random rays seen from the front, where probed.
+    /// Share of first hits of random rays seen from the front, where probed
+    /// ([`winding::probe_blind`]).
     pub front_hit_share: Option<f64>,
     /// Sentences for the user.
     pub warnings: Vec<String>,

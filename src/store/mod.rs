@@ -12,12 +12,16 @@
 
 mod accept;
 pub mod archive;
+pub mod artifacts;
 mod blob;
 pub mod compact;
 mod error;
+mod fetch;
+mod noise;
 mod owner;
 pub mod queue;
 pub mod read;
+mod rows;
 pub mod settle;
 pub mod submit;
 
@@ -26,7 +30,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePo
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-pub use queue::{Accepted, Job, Kind, Lease, Outcome};
+pub use queue::{Accepted, Job, Kind, Lease, Left, Outcome};
 pub use read::{Detail, StudyInfo};
 pub use settle::Settled;
 pub use submit::{Cell, Submission, Submitted};

@@ -58,6 +58,13 @@ pub enum Outcome {
     Crashed(String),
 }
 
+/// Jobs that wait or are under way.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Left {
+    pub trials: i64,
+    pub judgements: i64,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Accepted {
     Yes,
@@ -227,16 +234,18 @@ impl Store {
     ///
     /// # Errors
     /// When the database fails.
-    pub async fn jobs_left(&self, study_id: i64) -> Result<i64> {
-        sqlx::query_scalar(
-            "SELECT count(*) FROM jobs j WHERE j.state IN ('queued', 'leased') AND \
+    pub async fn jobs_left(&self, study_id: i64) -> Result<Left> {
+        let (trials, judgements): (i64, i64) = sqlx::query_as(
+            "SELECT coalesce(sum(j.kind = 'trial'), 0), coalesce(sum(j.kind = 'judge'), 0) FROM jobs j \
+             WHERE j.state IN ('queued', 'leased') AND \
              ((j.kind = 'trial' AND j.target IN (SELECT measurement_id FROM study_runs WHERE study_id = $1)) OR \
              (j.kind = 'judge' AND j.target IN (SELECT judgement_id FROM study_runs WHERE study_id = $1)))",
         )
         .bind(study_id)
         .fetch_one(&self.writer)
         .await
-        .map_err(|e| self.explain("reading the queue", &e))
+        .map_err(|e| self.explain("reading the queue", &e))?;
+        Ok(Left { trials, judgements })
     }
 
     /// Whether a trial of the study waits.

@@ -1,9 +1,10 @@
 //! Results of a study, put together from rows. Medians over trials are computed
 //! here from the stored series, so that nothing derived is stored twice.
 
+use super::fetch::{SeriesRow, TrialRow};
 use super::{Store, blob};
 use crate::error::{Error, Result, did_you_mean};
-use crate::record::{Environment, Judgement, RepeatPolicy, RunSpec};
+use crate::record::{Judgement, RepeatPolicy, RunSpec};
 use crate::results::{Excluded, RunResult, RunStatus, StudyResults, TrialSummary};
 use crate::stats;
 use rayon::prelude::*;
@@ -68,29 +69,6 @@ struct RunRow {
     status: String,
     reason: Option<String>,
     stop_reason: Option<String>,
-}
-
-#[derive(FromRow, Clone)]
-struct TrialRow {
-    measurement_id: String,
-    repeat_index: i64,
-    take: i64,
-    total_cull_ns: f64,
-    build_ns: i64,
-    prepare_ns: i64,
-    load_ns: i64,
-    peak_rss_bytes: i64,
-    noise: f64,
-    noisy: i64,
-}
-
-#[derive(FromRow)]
-struct SeriesRow {
-    measurement_id: String,
-    repeat_index: i64,
-    take: i64,
-    name: String,
-    data: Vec<u8>,
 }
 
 pub(super) fn status_of(text: &str) -> RunStatus {
@@ -345,81 +323,6 @@ impl Store {
             errors: judgement.map_or_else(Vec::new, |j| j.frames.clone()),
         })
     }
-
-    async fn trials_of(&self, study_id: i64) -> Result<HashMap<String, Vec<TrialRow>>> {
-        let rows: Vec<TrialRow> = sqlx::query_as(
-            "SELECT measurement_id, repeat_index, take, total_cull_ns, build_ns, prepare_ns, load_ns, peak_rss_bytes, \
-             noise, noisy FROM trials WHERE measurement_id IN (SELECT measurement_id FROM study_runs WHERE study_id = $1) \
-             ORDER BY measurement_id, repeat_index, take",
-        )
-        .bind(study_id)
-        .fetch_all(&self.readers)
-        .await
-        .map_err(|e| self.explain("reading trials", &e))?;
-        Ok(group(rows, |r| r.measurement_id.clone()))
-    }
-
-    async fn series_of(&self, study_id: i64) -> Result<HashMap<String, Vec<SeriesRow>>> {
-        let rows: Vec<SeriesRow> = sqlx::query_as(
-            "SELECT measurement_id, repeat_index, take, name, data FROM series WHERE role = 'series' AND \
-             measurement_id IN (SELECT measurement_id FROM study_runs WHERE study_id = $1) ORDER BY measurement_id, \
-             repeat_index, take, role, ordinal",
-        )
-        .bind(study_id)
-        .fetch_all(&self.readers)
-        .await
-        .map_err(|e| self.explain("reading series", &e))?;
-        Ok(group(rows, |r| r.measurement_id.clone()))
-    }
-
-    async fn counters_of(&self, study_id: i64) -> Result<HashMap<String, BTreeMap<String, f64>>> {
-        let rows: Vec<(String, String, f64)> = sqlx::query_as(
-            "SELECT measurement_id, name, value FROM counters WHERE measurement_id IN \
-             (SELECT measurement_id FROM study_runs WHERE study_id = $1)",
-        )
-        .bind(study_id)
-        .fetch_all(&self.readers)
-        .await
-        .map_err(|e| self.explain("reading counters", &e))?;
-        let mut out: HashMap<String, BTreeMap<String, f64>> = HashMap::new();
-        for (id, name, value) in rows {
-            out.entry(id).or_default().insert(name, value);
-        }
-        Ok(out)
-    }
-
-    async fn judgements_of(&self, study_id: i64) -> Result<HashMap<String, Judgement>> {
-        let rows: Vec<(String, String)> = sqlx::query_as(
-            "SELECT judgement_id, record_json FROM judgements WHERE judgement_id IN \
-             (SELECT judgement_id FROM study_runs WHERE study_id = $1)",
-        )
-        .bind(study_id)
-        .fetch_all(&self.readers)
-        .await
-        .map_err(|e| self.explain("reading judgements", &e))?;
-        rows.into_par_iter().map(|(id, json)| Ok((id, self.parse(&json, "a judgement")?))).collect()
-    }
-
-    async fn environments_of(&self, study_id: i64) -> Result<BTreeMap<String, Environment>> {
-        let rows: Vec<(String, String)> = sqlx::query_as(
-            "SELECT e.machine_class, e.environment_json FROM environments e WHERE e.environment_id IN \
-             (SELECT t.environment_id FROM trials t JOIN study_runs r ON r.measurement_id = t.measurement_id \
-             WHERE r.study_id = $1)",
-        )
-        .bind(study_id)
-        .fetch_all(&self.readers)
-        .await
-        .map_err(|e| self.explain("reading environments", &e))?;
-        rows.into_iter().map(|(class, json)| Ok((class, self.parse(&json, "an environment")?))).collect()
-    }
-}
-
-fn group<T>(rows: Vec<T>, key: impl Fn(&T) -> String) -> HashMap<String, Vec<T>> {
-    let mut out: HashMap<String, Vec<T>> = HashMap::new();
-    for row in rows {
-        out.entry(key(&row)).or_default().push(row);
-    }
-    out
 }
 
 fn summary(t: &TrialRow) -> TrialSummary {

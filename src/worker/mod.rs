@@ -11,14 +11,13 @@ pub mod lane;
 use crate::error::{Error, Result};
 use crate::record::{Judgement, RepeatPolicy, TrialRecord};
 use crate::results::RunStatus;
-use crate::store::{self, Accepted, Kind, Lease, Outcome, Settled, Store, queue};
+use crate::store::{self, Accepted, Kind, Lease, Left, Outcome, Settled, Store, queue};
 use child::{Ended, Launcher, Request};
 use lane::Lane;
 use serde::Serialize;
 use std::collections::HashSet;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
@@ -61,7 +60,7 @@ pub enum Event {
         reason: Option<String>,
         wall_ms: f64,
         /// Jobs of this study still to do.
-        left: i64,
+        left: Left,
     },
     RunEnded {
         measurement_id: String,
@@ -81,7 +80,7 @@ struct Crew {
     options: Options,
     tell: Listener,
     stop: watch::Receiver<bool>,
-    left: AtomicI64,
+    left: Mutex<Left>,
 }
 
 /// Works until the study has no job left, or `stop` turns true. True if it was stopped.
@@ -104,12 +103,12 @@ pub async fn work(
         options: options.clone(),
         tell,
         stop,
-        left: AtomicI64::new(0),
+        left: Mutex::new(Left::default()),
     });
     store.return_orphans().await?;
     // A process may have died between accepting a trial and drawing the conclusion.
     crew.settle_all().await?;
-    crew.left.store(store.jobs_left(study_id).await?, Ordering::Relaxed);
+    *crew.left() = store.jobs_left(study_id).await?;
     let mut tasks = tokio::task::JoinSet::new();
     let single = options.launcher.lane_core.is_none();
     let kinds: Vec<&'static [Kind]> = if single {
@@ -165,7 +164,7 @@ impl Crew {
                 continue;
             }
             // Nothing to take. Others may still work on what will become more jobs, or may have died.
-            if self.store.jobs_left(self.study_id).await? == 0 && self.settle_all().await? == 0 {
+            if self.store.jobs_left(self.study_id).await? == Left::default() && self.settle_all().await? == 0 {
                 return Ok(());
             }
             if looked.elapsed() > Duration::from_secs(1) {
@@ -175,6 +174,10 @@ impl Crew {
             tokio::time::sleep(REST).await;
         }
         Ok(())
+    }
+
+    fn left(&self) -> MutexGuard<'_, Left> {
+        self.left.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn stopped(&self) -> bool {
@@ -209,7 +212,10 @@ impl Crew {
         if matches!(outcome, "returned" | "crashed") {
             // Not done: it waits again.
         } else {
-            self.left.fetch_sub(1, Ordering::Relaxed);
+            match kind {
+                Kind::Trial => self.left().trials -= 1,
+                Kind::Judge => self.left().judgements -= 1,
+            }
         }
         let concerned = match kind {
             Kind::Trial => vec![lease.job.target.clone()],
@@ -226,7 +232,7 @@ impl Crew {
             outcome,
             reason,
             wall_ms: start.elapsed().as_secs_f64() * 1e3,
-            left: self.left.load(Ordering::Relaxed).max(0),
+            left: *self.left(),
         });
         Ok(true)
     }
@@ -331,8 +337,7 @@ impl Crew {
 
     async fn settle(&self, measurement_id: &str, run: &str) -> Result<Settled> {
         let settled = self.store.settle(self.study_id, measurement_id, &self.policy).await?;
-        let change = i64::from(settled.trials_added) - i64::from(settled.trials_cancelled);
-        self.left.fetch_add(change, Ordering::Relaxed);
+        self.left().trials += i64::from(settled.trials_added) - i64::from(settled.trials_cancelled);
         if settled.status != RunStatus::Pending {
             (self.tell)(Event::RunEnded {
                 measurement_id: measurement_id.to_string(),

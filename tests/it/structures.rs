@@ -1,20 +1,23 @@
 //! Structures: every triangle kept, bounds that hold, counts in the paper's terms.
 
+mod bsp;
+mod policies;
+
 use crate::common::soup;
-use cullmark::hierarchy::Hierarchy;
-use cullmark::math::DVec3;
+use cullmark::hierarchy::{Hierarchy, LANES, NONE};
+use cullmark::math::{Camera, DVec3, Pose, View};
 use cullmark::registry::Spec;
 use cullmark::scene::Scene;
 use cullmark::structure;
 
-pub fn build(text: &str, scene: &Scene) -> Hierarchy {
+fn build(text: &str, scene: &Scene) -> Hierarchy {
     let (s, _) = structure::make(&Spec::parse(text).unwrap()).unwrap();
-    let h = s.build(scene).unwrap_or_else(|e| panic!("{text}: {e}"));
+    let h = s.build(scene).unwrap_or_else(|e| panic!("{text} on {}: {e}", scene.name));
     h.assert_well_formed(scene);
     h
 }
 
-/// A scene of the given triangles, one material in three by turns.
+/// A scene of the given triangles, three materials by turns.
 fn scene_of(name: &str, triangles: &[[DVec3; 3]]) -> Scene {
     let n = triangles.len() as u32;
     let mut scene = Scene {
@@ -34,52 +37,48 @@ fn scene_of(name: &str, triangles: &[[DVec3; 3]]) -> Scene {
     scene
 }
 
+/// Two triangles for each unit square of an n x n floor.
+fn floor(n: u32, height: impl Fn(f64, f64) -> f64) -> Vec<[DVec3; 3]> {
+    let corner = |i: u32, j: u32| DVec3::new(f64::from(i), f64::from(j), height(f64::from(i), f64::from(j)));
+    let square = |i, j| {
+        let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    };
+    (0..n * n).flat_map(|k| square(k % n, k / n)).collect()
+}
+
 /// Ordinary and degenerate scenes that every structure must take.
 fn scenes() -> Vec<Scene> {
-    let t = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| [a, b, c].map(DVec3::from);
-    let one = t([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]);
-    let mut flat = Vec::new();
-    for i in 0..20 {
-        for j in 0..20 {
-            let (x, y) = (f64::from(i), f64::from(j));
-            flat.push(t([x, y, 0.0], [x + 1.0, y, 0.0], [x + 1.0, y + 1.0, 0.0]));
-            flat.push(t([x, y, 0.0], [x + 1.0, y + 1.0, 0.0], [x, y + 1.0, 0.0]));
-        }
-    }
-    let sloped = flat.iter().map(|t| t.map(|p| DVec3::new(p.x, p.y, p.x * 0.3 + p.y * 0.7))).collect::<Vec<_>>();
+    let one = [DVec3::ZERO, DVec3::X, DVec3::new(0.0, 1.0, 0.5)];
     let mut far = soup(5, 600, 20.0, 2.0);
     far.positions.iter_mut().for_each(|p| *p += DVec3::new(1e7, -1e7, 1e7));
     far.name = "far".into();
     far.anchor();
-    let slivers: Vec<[DVec3; 3]> = (0..300)
-        .map(|i| {
-            let a = DVec3::new(f64::from(i % 17), f64::from(i % 13), f64::from(i % 7));
-            let along = DVec3::new(5.0, f64::from(i % 3) - 1.0, 2.0);
-            [a, a + along, a + along * 0.5 + DVec3::new(0.0, 1e-9, 1e-7)]
-        })
-        .collect();
-    let lines: Vec<[DVec3; 3]> =
-        (0..50).map(|i| [DVec3::X * f64::from(i), DVec3::X * f64::from(i + 1), DVec3::X * f64::from(i + 2)]).collect();
+    let sliver = |i: u32| {
+        let a = DVec3::new(f64::from(i % 17), f64::from(i % 13), f64::from(i % 7));
+        let along = DVec3::new(5.0, f64::from(i % 3) - 1.0, 2.0);
+        [a, a + along, a + along * 0.5 + DVec3::new(0.0, 1e-9, 1e-7)]
+    };
+    let line = |i: u32| [0, 1, 2].map(|k| DVec3::X * f64::from(i + k));
     vec![
         soup(1, 3000, 10.0, 0.3),
         soup(2, 400, 10.0, 8.0),
         far,
         scene_of("one", &[one]),
         scene_of("nothing", &[]),
-        scene_of("identical", &[one; 500]),
-        scene_of("coplanar", &flat),
-        scene_of("sloped", &sloped),
-        scene_of("slivers", &slivers),
-        scene_of("lines", &lines),
+        scene_of("identical", &[one; 300]),
+        scene_of("coplanar", &floor(20, |_, _| 0.0)),
+        scene_of("sloped", &floor(20, |x, y| x * 0.3 + y * 0.7)),
+        scene_of("hills", &floor(30, |x, y| (x * 0.7).sin() * 3.0 + (y * 0.4).cos() * 2.0)),
+        scene_of("slivers", &(0..300).map(sliver).collect::<Vec<_>>()),
+        scene_of("lines", &(0..50).map(line).collect::<Vec<_>>()),
         scene_of("points", &[[DVec3::ONE; 3]; 9]),
     ]
 }
 
-fn sorted(mut v: Vec<u32>) -> Vec<u32> {
-    v.sort_unstable();
-    v
-}
+const LISTS: &[&str] = &["list", "list:leaf_size=1", "list:leaf_size=100"];
 
+/// Every triangle once.
 const OCTREES: &[&str] = &[
     "octree",
     "octree:depth=0",
@@ -90,45 +89,152 @@ const OCTREES: &[&str] = &[
     "octree:policy=E,depth=7,leaf_limit=5,root=cube",
 ];
 
-const CUT: &[&str] = &[
-    "octree:policy=R",
-    "octree:policy=S",
-    "octree:policy=R,depth=2,root=cube",
-    "octree:policy=S,depth=3,root=cube",
-    "octree:policy=R,depth=5,leaf_limit=40",
-    "octree:policy=S,depth=5,leaf_limit=40",
-];
+const REPLICATED: &[&str] =
+    &["octree:policy=R", "octree:policy=R,depth=2,root=cube", "octree:policy=R,depth=5,leaf_limit=40"];
+
+const SPLIT: &[&str] =
+    &["octree:policy=S", "octree:policy=S,depth=3,root=cube", "octree:policy=S,depth=5,leaf_limit=40"];
 
 const BSPS: &[&str] = &[
     "bsp",
     "bsp:layout=binary",
-    "bsp:min_leaf=20,layout=binary",
-    "bsp:min_leaf=20",
-    "bsp:min_leaf=40,split_weight=0,candidates=3",
-    "bsp:min_leaf=40,split_weight=100,axis_penalty=0,sample=64",
+    "bsp:min_leaf=60,layout=binary",
+    "bsp:min_leaf=60",
+    "bsp:min_leaf=80,split_weight=0,candidates=3",
+    "bsp:min_leaf=80,split_weight=100,axis_penalty=0,sample=64,layout=binary",
 ];
+
+fn all() -> impl Iterator<Item = &'static str> {
+    [LISTS, OCTREES, REPLICATED, SPLIT, BSPS].into_iter().flatten().copied()
+}
+
+/// Large triangles through each other: small leaves need more pieces than a BSP may make.
+fn bsp_gives_up(text: &str, scene: &Scene) -> bool {
+    scene.name == "soup 2" && text.contains("bsp:min_leaf=")
+}
+
+/// Block, lane and level of every node, in the order of entries.
+fn nodes(h: &Hierarchy) -> Vec<(u32, usize, u32)> {
+    let mut out = Vec::new();
+    let mut pending: Vec<(u32, u32)> = (0..h.root_blocks).rev().map(|b| (b, 0)).collect();
+    while let Some((block, level)) = pending.pop() {
+        let links = &h.links[block as usize];
+        for lane in (0..LANES).filter(|l| links.live >> l & 1 == 1) {
+            out.push((block, lane, level));
+            if links.child[lane] != NONE {
+                pending.push((links.child[lane], level + 1));
+            }
+        }
+    }
+    out.sort_by_key(|(b, l, level)| (h.links[*b as usize].first[*l], *level));
+    out
+}
+
+/// Entry ranges of the leaves, in order.
+fn leaves(h: &Hierarchy) -> Vec<(u32, u32)> {
+    nodes(h)
+        .into_iter()
+        .filter(|(b, l, _)| h.links[*b as usize].child[*l] == NONE)
+        .map(|(b, l, _)| (h.links[b as usize].first[l], h.links[b as usize].end[l]))
+        .collect()
+}
 
 #[test]
 fn every_structure_is_well_formed_on_every_scene() {
     for scene in scenes() {
-        for text in ["list", "list:leaf_size=1", "list:leaf_size=100"].iter().chain(OCTREES).chain(CUT).chain(BSPS) {
-            // Large triangles through each other: small leaves take more pieces than a BSP may make.
-            if scene.name == "soup 2" && text.contains("bsp:min_leaf=") {
-                continue;
-            }
-            let started = std::time::Instant::now();
+        for text in all().filter(|t| !bsp_gives_up(t, &scene)) {
             let h = build(text, &scene);
-            eprintln!("{} {text}: {:?} {} ms", scene.name, h.stats, started.elapsed().as_millis());
+            assert!(h.stats.leaves as usize <= h.node_count(), "{text} on {}", scene.name);
+            assert_eq!(h.stats.leaves as usize, leaves(&h).len(), "{text} on {}", scene.name);
         }
     }
 }
 
 #[test]
-fn loose_and_enclosing_octrees_hold_every_triangle_once() {
+fn a_leaf_has_one_run_for_each_of_its_materials() {
     for scene in scenes() {
-        for text in OCTREES {
+        for text in all().filter(|t| !bsp_gives_up(t, &scene)) {
             let h = build(text, &scene);
-            assert_eq!(sorted(h.entries), (0..scene.len() as u32).collect::<Vec<_>>(), "{text} on {}", scene.name);
+            for (first, end) in leaves(&h) {
+                let mut materials: Vec<u32> =
+                    h.entries[first as usize..end as usize].iter().map(|t| scene.material_id[*t as usize]).collect();
+                assert!(materials.is_sorted(), "{text} on {}", scene.name);
+                materials.dedup();
+                assert_eq!(h.material_runs(first, end) as usize, materials.len(), "{text} on {}", scene.name);
+            }
         }
     }
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let large = soup(3, 150_000, 100.0, 1.0);
+    let small = soup(4, 12_000, 40.0, 1.0);
+    for text in all() {
+        let scene = if LISTS.contains(&text) || OCTREES.contains(&text) { &large } else { &small };
+        let (s, _) = structure::make(&Spec::parse(text).unwrap()).unwrap();
+        let [a, b] = [1, 2].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| s.build(scene)).unwrap()
+        });
+        assert!(a.entries == b.entries && a.fragments == b.fragments && a.material_run == b.material_run, "{text}");
+        assert!(a.bounds == b.bounds && a.links == b.links && a.parent == b.parent && a.stats == b.stats, "{text}");
+        assert!(a.half_spaces == b.half_spaces, "{text}");
+    }
+}
+
+/// Entries and nodes that a plain walk in f64 visits: no box wholly beyond a plane.
+fn submitted(h: &Hierarchy, view: &View) -> (u64, u64) {
+    let (mut entries, mut visited) = (0, 0);
+    let mut pending: Vec<u32> = (0..h.root_blocks).collect();
+    while let Some(block) = pending.pop() {
+        let links = &h.links[block as usize];
+        for lane in (0..LANES).filter(|l| links.live >> l & 1 == 1) {
+            visited += 1;
+            let b = h.bounds[block as usize].get(lane);
+            let (lo, hi) = (b.lo.as_dvec3() + h.origin, b.hi.as_dvec3() + h.origin);
+            let outside = view.planes.iter().any(|p| {
+                let farthest = DVec3::select(p.normal.cmpge(DVec3::ZERO), hi, lo);
+                p.normal.dot(farthest - view.eye) + p.offset_m < 0.0
+            });
+            if !outside {
+                entries += u64::from(links.own_end[lane] - links.first[lane]);
+                if links.child[lane] != NONE {
+                    pending.push(links.child[lane]);
+                }
+            }
+        }
+    }
+    (entries, visited)
+}
+
+// A4.2
+#[test]
+fn a_deeper_octree_submits_fewer_triangles_and_asks_more_nodes() {
+    let scene = soup(6, 20_000, 50.0, 0.5);
+    let trees: Vec<Hierarchy> = (0..=6).map(|d| build(&format!("octree:depth={d}"), &scene)).collect();
+    let mut totals = vec![0; trees.len()];
+    for turn in 0..12 {
+        let angle = f64::from(turn) * 0.55;
+        let forward = DVec3::new(angle.cos(), angle.sin(), 0.1 * f64::from(turn % 3) - 0.1);
+        let eye = DVec3::new(f64::from(turn) - 6.0, 3.0, 1.0);
+        let view = View::new(&Camera::default(), &Pose { eye, forward, up: DVec3::Z });
+        let frames: Vec<(u64, u64)> = trees.iter().map(|h| submitted(h, &view)).collect();
+        for pair in frames.windows(2) {
+            assert!(pair[1].0 <= pair[0].0 && pair[1].1 >= pair[0].1, "{frames:?}");
+        }
+        totals.iter_mut().zip(&frames).for_each(|(t, f)| *t += f.0);
+    }
+    assert!(totals.windows(2).all(|w| w[1] < w[0]), "{totals:?}");
+    assert!(totals[4] * 2 < totals[0], "depth 4 culls more than half: {totals:?}");
+}
+
+#[test]
+fn unknown_and_impossible_parameters_are_named() {
+    let error = |text: &str| structure::make(&Spec::parse(text).unwrap()).err().unwrap().to_string();
+    assert!(error("octre").contains("did you mean `octree`?"));
+    assert!(error("octree:depth=11").contains("from 0 to 10"));
+    assert!(error("octree:policy=Q").contains("\"L\", \"R\", \"S\", \"E\""));
+    assert!(error("bsp:minleaf=3").contains("did you mean `min_leaf`?"));
+    assert!(error("list:leaf_size=0").contains("from 1 to"));
 }

@@ -119,7 +119,7 @@ fn building(
     };
     let at = centre + v3(push(i, w), push(j, d), 0.0);
     b.object();
-    b.paint(*rng.pick(&["brick_house", "plaster_house", "concrete_house", "sand_house", "paint_house"]));
+    b.paint(["brick_house", "plaster_house", "concrete_house", "sand_house", "paint_house"][rng.below(5)]);
     let shape = rng.below(10);
     let gabled = shape < 3 && storeys <= 4.0;
     b.within(Frame::at(at), |b| {
@@ -144,7 +144,7 @@ fn building(
             seed: rng.bits(),
         });
     }
-    // Windows, a door and balconies on the two sides that matter least to no one: all four.
+    // Only fronts on a street, and the small houses inside a block, get doors and windows.
     for side in 0..4 {
         let (width, depth) = if side % 2 == 0 { (w, d) } else { (d, w) };
         let face = Frame::quarter(at, side).then(&Frame::at(v3(0.0, -depth * 0.5, 0.0)));

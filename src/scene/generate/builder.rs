@@ -110,6 +110,16 @@ impl Builder {
         self.frame
     }
 
+    /// Nests `frame` until the frame returned is given back to [`Builder::leave`].
+    pub fn enter(&mut self, frame: Frame) -> Frame {
+        let inner = self.frame.then(&frame);
+        std::mem::replace(&mut self.frame, inner)
+    }
+
+    pub fn leave(&mut self, outer: Frame) {
+        self.frame = outer;
+    }
+
     /// Runs `f` making triangles that have no back.
     pub fn two_sided(&mut self, f: impl FnOnce(&mut Builder)) {
         self.two_sided = true;

@@ -13,6 +13,7 @@ mod props;
 pub(in crate::scene) mod random;
 mod rooms;
 mod solids;
+mod terrain;
 
 use crate::error::{Error, Result};
 use crate::registry::{Entry, Spec, Value, find};
@@ -33,7 +34,7 @@ pub static ALL: &[Entry<dyn Generator>] = &[arena::ENTRY, blocks::ENTRY, rooms::
 pub fn make(spec: &Spec) -> Result<(Box<dyn Generator>, Spec)> {
     let (entry, resolved) = find("generator", ALL, spec)?;
     let least = match entry.name {
-        "arena" => arena::TRIANGLES_MIN,
+        "arena" => arena::least(&resolved),
         "blocks" => blocks::TRIANGLES_MIN,
         _ => rooms::TRIANGLES_MIN,
     };

@@ -90,9 +90,8 @@ impl Generator for Rooms {
         };
         // One thing a room first, so that even a small budget furnishes every room.
         for round in 0..16 {
-            for room in 0..80 {
-                let busy = !self.clustered || crowded[room] || round == 0;
-                if busy && (round < 6 || !self.clustered || crowded[room]) {
+            for (room, crowded) in crowded.iter().enumerate() {
+                if !self.clustered || *crowded || round == 0 {
                     props.extend(furnish(room, round, &mut rng));
                 }
             }

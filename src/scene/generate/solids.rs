@@ -94,7 +94,7 @@ impl Builder {
     /// A simple polygon (counter-clockwise in its section) drawn out from `w0` to `w1`.
     pub fn extrude(&mut self, along: Along, section: &[DVec2], w0: f64, w1: f64) {
         let flip = along.mirrored();
-        let mut put = |b: &mut Builder, p: [(DVec2, f64); 3]| {
+        let put = |b: &mut Builder, p: [(DVec2, f64); 3]| {
             let [a, c, d] = p.map(|(s, w)| along.point(s.x, s.y, w));
             if flip { b.tri(a, d, c) } else { b.tri(a, c, d) }
         };
@@ -196,20 +196,6 @@ impl Builder {
         }
     }
 
-    /// A solid flight that climbs along +x from `lo` to `hi` (its top step ends at `hi`).
-    pub fn stairs(&mut self, lo: DVec3, hi: DVec3, steps: usize) {
-        let mut section = vec![DVec2::new(lo.x, lo.z), DVec2::new(hi.x, lo.z), DVec2::new(hi.x, hi.z)];
-        let (run, rise) = ((hi.x - lo.x) / steps as f64, (hi.z - lo.z) / steps as f64);
-        for s in (1..=steps).rev() {
-            let x = lo.x + run * (s - 1) as f64;
-            section.push(DVec2::new(x, lo.z + rise * s as f64));
-            if s > 1 {
-                section.push(DVec2::new(x, lo.z + rise * (s - 1) as f64));
-            }
-        }
-        self.extrude(Along::Y, &section, lo.y, hi.y);
-    }
-
     /// A flight of slabs rather than a solid: one can pass under it.
     pub fn open_stairs(&mut self, lo: DVec3, hi: DVec3, steps: usize, thickness: f64) {
         let (run, rise) = ((hi.x - lo.x) / steps as f64, (hi.z - lo.z) / steps as f64);
@@ -226,12 +212,6 @@ impl Builder {
                 section.push(DVec2::new(x, lo.z + rise * (s - 1) as f64));
             }
         }
-        self.extrude(Along::Y, &section, lo.y, hi.y);
-    }
-
-    /// A ramp that climbs along +x.
-    pub fn ramp(&mut self, lo: DVec3, hi: DVec3) {
-        let section = [DVec2::new(lo.x, lo.z), DVec2::new(hi.x, lo.z), DVec2::new(hi.x, hi.z)];
         self.extrude(Along::Y, &section, lo.y, hi.y);
     }
 }

@@ -84,6 +84,7 @@ fn parse(json: &[u8]) -> Result<gltf::Document> {
         return Err(Error::new(format!("requires the extension {e}, which cullmark does not read")).help(help));
     }
     root.extensions_required.clear();
+    check_positions(&mut root)?;
     gltf::Document::from_json(root).map_err(|e| {
         let what = match &e {
             gltf::Error::Validation(all) => {
@@ -95,6 +96,24 @@ fn parse(json: &[u8]) -> Result<gltf::Document> {
         };
         Error::new(format!("not a valid glTF: {what}")).help("run the Khronos glTF validator on it, or export it again")
     })
+}
+
+/// What the crate's own validation needs first: it follows the accessors of
+/// positions unchecked, and insists on their bounds, which cullmark never reads.
+fn check_positions(root: &mut gltf::json::Root) -> Result<()> {
+    use gltf::json::validation::Checked::Valid;
+    for (n, mesh) in root.meshes.iter().enumerate() {
+        for index in mesh.primitives.iter().filter_map(|p| p.attributes.get(&Valid(Semantic::Positions))) {
+            let count = root.accessors.len();
+            let Some(accessor) = root.accessors.get_mut(index.value()) else {
+                let message = format!("mesh {n} has its positions in accessor {}, of {count}", index.value());
+                return Err(Error::new(message).help("the file is damaged: export it again"));
+            };
+            accessor.min = Some(vec![0.0f32; 3].into());
+            accessor.max = accessor.min.clone();
+        }
+    }
+    Ok(())
 }
 
 struct Builder<'a> {

@@ -31,7 +31,8 @@ pub fn fingerprint(source: &PathSource, scene_fingerprint: &str) -> Result<Strin
             h.update(&csv::read_bytes(path)?);
         }
         PathSource::Generated(spec) => {
-            let (entry, resolved) = registry::find("walkthrough generator", generate::ALL, spec)?;
+            let (_, resolved) = generate::make(spec)?;
+            let (entry, _) = registry::find("walkthrough generator", generate::ALL, &resolved)?;
             h.update(b"\0walk\0");
             h.update(resolved.to_string().as_bytes());
             h.update(&entry.revision.to_le_bytes());

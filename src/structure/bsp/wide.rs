@@ -52,9 +52,9 @@ mod tests {
     fn a_full_binary_tree_of_three_levels_becomes_one_group_of_eight() {
         let unit = Box32 { lo: crate::math::Vec3::ZERO, hi: crate::math::Vec3::ONE };
         let mut binary: Vec<Node> = (0..15).map(|i| Node { bounds: unit, ..Node::new(i, i + 1, 0) }).collect();
-        for i in 0..7 {
-            binary[i].first_child = 2 * i as u32 + 1;
-            binary[i].child_count = 2;
+        for (i, node) in binary.iter_mut().enumerate().take(7) {
+            node.first_child = 2 * i as u32 + 1;
+            node.child_count = 2;
         }
         let wide = collapse(&binary);
         assert_eq!(wide.len(), 9);

@@ -23,7 +23,7 @@ const TASK_TRIANGLES: usize = 1 << 10;
 
 /// Policy R: a copy in every leaf that the triangle overlaps.
 pub fn build_replicated(scene: &Scene, root: &Aabb, depth: u32, leaf_limit: u32) -> Result<Hierarchy> {
-    let tree = Tree::grow(scene, root, depth, leaf_limit, &|t, _, out: &mut Vec<u32>| out.push(t))?;
+    let tree = Tree::grow(scene, root, depth, leaf_limit, entries_max(scene), &|t, _, out: &mut Vec<u32>| out.push(t))?;
     let boxes = tree.boxes(|t, cell| intersection(&scene.triangle_aabb(*t), cell));
     let entries = tree.items().copied().collect();
     Ok(tree.finish(scene, leaf_limit, &boxes, entries, None))
@@ -33,7 +33,7 @@ pub fn build_replicated(scene: &Scene, root: &Aabb, depth: u32, leaf_limit: u32)
 /// copy there. Clipping each triangle once, at its leaf, makes a fraction of the
 /// pieces that splitting level by level does, whose diagonals are split again.
 pub fn build_split(scene: &Scene, root: &Aabb, depth: u32, leaf_limit: u32) -> Result<Hierarchy> {
-    let tree = Tree::grow(scene, root, depth, leaf_limit, &|t, cell, out: &mut Vec<Piece>| {
+    let tree = Tree::grow(scene, root, depth, leaf_limit, entries_max(scene), &|t, cell, out: &mut Vec<Piece>| {
         out.extend(clip(scene, t, cell, root));
     })?;
     let boxes = tree.boxes(|p, _| p.bounds(scene));
@@ -41,6 +41,10 @@ pub fn build_split(scene: &Scene, root: &Aabb, depth: u32, leaf_limit: u32) -> R
     let was_split = tree.items().any(|p| p.made != 0);
     let fragments = was_split.then(|| tree.items().map(|p| p.corners).collect());
     Ok(tree.finish(scene, leaf_limit, &boxes, entries, fragments))
+}
+
+fn entries_max(scene: &Scene) -> u64 {
+    ENTRIES_MAX.max(4 * scene.len() as u64)
 }
 
 /// The triangles that overlap each octant of a cell.
@@ -215,12 +219,18 @@ impl<T: Send> Growth<'_, T> {
 }
 
 impl<T: Send + Sync> Tree<T> {
-    fn grow(scene: &Scene, root: &Aabb, depth: u32, leaf_limit: u32, put: Put<'_, T>) -> Result<Tree<T>> {
+    fn grow(
+        scene: &Scene,
+        root: &Aabb,
+        depth: u32,
+        leaf_limit: u32,
+        entries_max: u64,
+        put: Put<'_, T>,
+    ) -> Result<Tree<T>> {
         let mut tree = Tree { nodes: Vec::new(), leaves: Vec::new() };
         if scene.is_empty() {
             return Ok(tree);
         }
-        let entries_max = ENTRIES_MAX.max(4 * scene.len() as u64);
         let leaf_limit = leaf_limit as usize;
         let growth = Growth { scene, put, depth, leaf_limit, entries_max, entries: AtomicU64::new(0) };
         let branch = growth.grow((0..scene.len() as u32).collect(), *root, 0).ok_or_else(|| {
@@ -351,5 +361,17 @@ mod tests {
         let t = [DVec3::new(0.5, 0.2, 0.2), DVec3::new(0.5, 0.8, 0.2), DVec3::new(0.5, 0.2, 0.4)];
         let [low, high, ..] = octants(&Aabb { lo: DVec3::ZERO, hi: DVec3::ONE });
         assert!(triangle_overlaps(&t, &low) && triangle_overlaps(&t, &high));
+    }
+
+    #[test]
+    fn too_many_copies_are_an_error_that_names_the_parameter() {
+        let corners = vec![DVec3::ZERO, DVec3::new(9.0, 1.0, 2.0), DVec3::new(1.0, 9.0, 3.0)];
+        let scene =
+            Scene { positions: corners, triangles: vec![[0, 1, 2]; 50], material_id: vec![0; 50], ..Scene::default() };
+        let put: Put<'_, u32> = &|t, _, out| out.push(t);
+        let e = Tree::grow(&scene, &scene.bounds(), 6, 0, 3000, put).err().expect("50 large triangles at depth 6");
+        assert_eq!(e.key.as_deref(), Some("depth"));
+        assert!(e.message.contains("3000") && e.help.is_some(), "{e}");
+        assert!(Tree::grow(&scene, &scene.bounds(), 1, 0, 3000, put).is_ok());
     }
 }

@@ -88,9 +88,12 @@ pub fn pull_up_bounds(nodes: &mut [Node]) {
 
 /// Sorts triangles by material, ties by number: fewest draw calls, one possible order.
 pub fn sort_by_material(triangles: &mut [u32], scene: &Scene) {
-    let key = |t: &u32| (scene.material_id[*t as usize], *t);
-    if !triangles.is_sorted_by_key(key) {
-        triangles.sort_unstable_by_key(key);
+    // Fetched once each into words that compare in registers.
+    let mut keys: Vec<u64> =
+        triangles.iter().map(|t| u64::from(scene.material_id[*t as usize]) << 32 | u64::from(*t)).collect();
+    if !keys.is_sorted() {
+        keys.sort_unstable();
+        triangles.iter_mut().zip(keys).for_each(|(t, key)| *t = key as u32);
     }
 }
 

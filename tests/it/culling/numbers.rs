@@ -171,7 +171,7 @@ fn the_guard_is_small() {
         let behind = |gap: f64| {
             let near = view.camera.near_m;
             let c = DVec3::new(near - gap, 0.0, 0.0);
-            Aabb { lo: c - DVec3::splat(distance) + DVec3::X * 0.0, hi: DVec3::new(c.x, distance, distance) }
+            Aabb { lo: c - DVec3::splat(distance), hi: DVec3::new(c.x, distance, distance) }
         };
         assert_eq!(our_culls(&view, DVec3::ZERO, &[behind(0.0)]), 0, "touching, {distance}");
         let guard = 8.5 * U * (3.0 * distance + 0.3);

@@ -1,0 +1,140 @@
+//! Every structure, culling test and walk before the oracle.
+
+use super::{accuracy, cameras};
+use crate::common::{shared, soup};
+use cullmark::culling::{Class, make_tests, make_walk};
+use cullmark::hierarchy::Hierarchy;
+use cullmark::math::{Camera, DVec3, Pose};
+use cullmark::oracle::{judged_frames, truth};
+use cullmark::record::{Accuracy, FrameErrors, PathSource, PathSpec, SceneSource, Up, Winding};
+use cullmark::registry::{Spec, parse_sum};
+use cullmark::runner::Setup;
+use cullmark::scene::{Scene, load, walkthrough};
+use cullmark::structure::Structure;
+
+/// Structures in every variant that changes what they submit.
+fn structures() -> Vec<String> {
+    let mut all = vec!["list".to_string(), "list:leaf_size=7".into(), "octree:depth=4,leaf_limit=16".into()];
+    for policy in ["L", "R", "S", "E"] {
+        for root in ["aabb", "cube"] {
+            all.push(format!("octree:depth=3,policy={policy},root={root}"));
+        }
+    }
+    all.extend(["wide", "binary"].map(|layout| format!("bsp:min_leaf=40,layout={layout}")));
+    all
+}
+
+const CULLINGS: [&str; 9] = [
+    "none",
+    "frustum",
+    "frustum:plane_mask=false",
+    "frustum:last_plane=true",
+    "frustum:node_test=box_plane",
+    "normal_mask",
+    "octant_mask",
+    "frustum+normal_mask",
+    "frustum+octant_mask",
+];
+
+fn generated(spec: &str) -> Scene {
+    let spec = Spec::parse(spec).unwrap();
+    cullmark::scene::generate::make(&spec).unwrap().0.generate()
+}
+
+/// Views from inside the scene, all around and a little up and down.
+fn look_around(scene: &Scene, count: u32) -> Vec<Pose> {
+    let b = scene.bounds();
+    (0..count)
+        .map(|i| {
+            let (share, turn) = ((f64::from(i) + 0.5) / f64::from(count), f64::from(i) * 2.4);
+            let eye = b.lo + b.size() * DVec3::new(0.2 + 0.6 * share, 0.8 - 0.6 * share, 0.35);
+            let forward = DVec3::new(libm::cos(turn), libm::sin(turn), 0.4 * libm::sin(turn * 3.0)).normalize();
+            Pose { eye, forward, up: DVec3::Z }
+        })
+        .collect()
+}
+
+/// A structure that is built already: one build serves every method on it.
+struct Built(Hierarchy);
+
+impl Structure for Built {
+    fn build(&self, _: &Scene) -> cullmark::Result<Hierarchy> {
+        Ok(self.0.clone())
+    }
+}
+
+/// Judges every pair over `poses`; returns how many were judged. Truth is shared.
+fn all_pairs_face_the_oracle(scene: &Scene, camera: &Camera, poses: &[Pose], accuracy: &Accuracy) -> usize {
+    let numbered: Vec<(u32, Pose)> = (0u32..).zip(poses.iter().copied()).collect();
+    let truth = truth(scene, camera, &numbered, accuracy);
+    let seen: usize = truth.frames.iter().map(|f| f.visible.len()).sum();
+    assert!(seen > 20 * poses.len(), "{} shows next to nothing", scene.name);
+    let judged = |structure: &String| -> usize {
+        let made = cullmark::structure::make(&Spec::parse(structure).unwrap()).unwrap().0;
+        let built = Built(made.build(scene).unwrap());
+        let mut judged = 0;
+        for culling in CULLINGS {
+            for walk in ["depth_first", "flat"] {
+                let tests = make_tests(&parse_sum(culling).unwrap()).unwrap().0;
+                let walk_made = make_walk(&Spec::new(walk)).unwrap().0;
+                let parts = Setup::from_parts(scene.clone(), poses.to_vec(), camera, &built, tests, walk_made);
+                let judgement = parts.unwrap().judge(&truth);
+                let method = format!("{} {structure} {culling} {walk}", scene.name);
+                assert_eq!(judgement.wrong, None, "{method}");
+                let sum = |of: fn(&FrameErrors) -> u64| judgement.frames.iter().map(of).sum::<u64>();
+                assert_eq!(judgement.frames.len(), poses.len());
+                if judgement.class <= Class::Conservative {
+                    assert_eq!(sum(|f| f.false_culls + f.potential_lost + f.false_cull_pixels), 0, "{method}");
+                } else if sum(|f| f.false_culls) > 0 {
+                    println!(
+                        "{method}: lost {} of {} visible triangles, {} of {} pixels",
+                        sum(|f| f.false_culls),
+                        sum(|f| f.visible),
+                        sum(|f| f.false_cull_pixels),
+                        sum(|f| f.covered_pixels)
+                    );
+                }
+                judged += 1;
+            }
+        }
+        judged
+    };
+    use rayon::prelude::*;
+    structures().par_iter().map(judged).sum()
+}
+
+#[test]
+fn every_structure_x_culling_pair_faces_the_oracle() {
+    let pairs = structures().len() * CULLINGS.len() * 2;
+    let around = DVec3::new(2.0e6, -1.0e6, 300.0);
+    for (spec, offset) in [("rooms", DVec3::ZERO), ("blocks", around)] {
+        let mut scene = generated(spec);
+        scene.positions.iter_mut().for_each(|p| *p += offset);
+        scene.anchor();
+        // A few leaves and panes: two-sided, not hiding.
+        for t in (0..scene.len()).step_by(9) {
+            scene.two_sided[t] = true;
+            scene.occluder[t] = t % 2 == 0;
+        }
+        let poses = look_around(&scene, 3);
+        assert_eq!(all_pairs_face_the_oracle(&scene, &Camera::default(), &poses, &accuracy(160, 90, 1)), pairs);
+    }
+    let scene = soup(12, 1500, 10.0, 0.6);
+    for camera in cameras() {
+        assert_eq!(all_pairs_face_the_oracle(&scene, &camera, &look_around(&scene, 2), &accuracy(96, 54, 1)), pairs);
+    }
+}
+
+#[test]
+fn every_pair_faces_the_oracle_on_a_real_map() {
+    let Some(obj) = shared("q3_czest3ctf/q3_czest3ctf.obj") else { return };
+    let source = SceneSource::File(obj);
+    let spec = load::describe("q3_czest3ctf", source, Winding::Ccw, Some(Up::Z), 0.0254, false).unwrap();
+    let scene = load::load(&spec).unwrap();
+    let source = PathSource::File(shared("q3_czest3ctf/q3_czest3ctf_path1.csv").unwrap());
+    let path = PathSpec { name: "path1".into(), source, frames: None, stride: 1, fingerprint: String::new() };
+    let poses = walkthrough::load(&path, &spec, &scene).unwrap();
+    let judged: Vec<Pose> =
+        judged_frames(poses.len() as u32, &accuracy(1, 1, 1)).into_iter().map(|f| poses[f as usize]).collect();
+    all_pairs_face_the_oracle(&scene, &Camera::default(), &judged, &accuracy(160, 90, 1));
+}
