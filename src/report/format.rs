@@ -22,7 +22,7 @@ pub fn number(x: f64, digits: i32) -> String {
         return grouped(&format!("{x:.0}"));
     }
     let magnitude = x.abs().log10().floor() as i32;
-    if magnitude < -4 || magnitude >= 15 {
+    if !(-4..15).contains(&magnitude) {
         return scientific(x, digits);
     }
     // Rounding may lift 9.996 to 10.0; one digit more or less is no matter there.
