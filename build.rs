@@ -25,4 +25,6 @@ fn main() {
         println!("cargo:rerun-if-changed={log}");
     }
     println!("cargo:rerun-if-changed=build.rs");
+    // `sqlx::migrate!` embeds the folder; a new file in it changes no source.
+    println!("cargo:rerun-if-changed=migrations");
 }

@@ -21,11 +21,42 @@ pub fn isa() -> &'static str {
     "scalar"
 }
 
-/// Cores this process may use. Asked once: pinning narrows what the system
-/// answers later, and a trial would name another class of machine than its study.
+/// Numbers of the cores this process may use, ascending: a container or
+/// `taskset` may leave it any of the machine's. Asked once: pinning narrows what the
+/// system answers later, and a trial would name another class of machine than its study.
+pub fn cores() -> &'static [u32] {
+    static CORES: std::sync::OnceLock<Vec<u32>> = std::sync::OnceLock::new();
+    CORES.get_or_init(|| {
+        // A quota may allow fewer at a time than there are to choose from.
+        let count = std::thread::available_parallelism().map_or(1, |n| n.get());
+        let mut cores = affinity();
+        if cores.len() < count {
+            cores = (0..count as u32).collect();
+        }
+        cores.split_off(cores.len() - count)
+    })
+}
+
 pub fn core_count() -> u32 {
-    static CORES: std::sync::OnceLock<u32> = std::sync::OnceLock::new();
-    *CORES.get_or_init(|| std::thread::available_parallelism().map_or(1, |n| n.get() as u32))
+    cores().len() as u32
+}
+
+#[cfg(target_os = "linux")]
+fn affinity() -> Vec<u32> {
+    // SAFETY: cpu_set_t is plain bits and valid when zeroed; sched_getaffinity fills
+    // as many bytes as it is given; CPU_ISSET checks its index against the set's size.
+    unsafe {
+        let mut set: libc::cpu_set_t = std::mem::zeroed();
+        if libc::sched_getaffinity(0, size_of::<libc::cpu_set_t>(), &mut set) != 0 {
+            return Vec::new();
+        }
+        (0..libc::CPU_SETSIZE as usize).filter(|c| libc::CPU_ISSET(*c, &set)).map(|c| c as u32).collect()
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn affinity() -> Vec<u32> {
+    Vec::new()
 }
 
 /// `release`, `dist`, `debug`: as this binary was built.
@@ -36,9 +67,9 @@ pub fn build_profile() -> &'static str {
 /// The core of the measuring lane: the last one, since interrupts and daemons
 /// favour the first. `None` on a machine with one core.
 pub fn measuring_core() -> Option<u32> {
-    match core_count() {
-        0 | 1 => None,
-        n => Some(n - 1),
+    match cores() {
+        [.., _, last] => Some(*last),
+        _ => None,
     }
 }
 
@@ -114,7 +145,7 @@ pub fn pin_to(_cores: &[u32]) -> Result<()> {
 
 /// Every core but the measuring one: where judges and builds may run.
 pub fn auxiliary_cores(measuring: Option<u32>) -> Vec<u32> {
-    (0..core_count()).filter(|c| Some(*c) != measuring).collect()
+    cores().iter().copied().filter(|c| Some(*c) != measuring).collect()
 }
 
 /// Caps the address space of this process; an allocation beyond it aborts.
@@ -159,7 +190,7 @@ pub fn involuntary_switches() -> u64 {
 }
 
 /// Times a fixed kernel (dependent multiplications and reads over 512 KiB, near
-/// 1 ms): the median of five. A machine that is shared, throttled or
+/// 0.3 ms): the median of five. Short, since every trial pays for it twice. A machine that is shared, throttled or
 /// interrupted shows in it before it shows in a result.
 pub fn sentinel_ns() -> f64 {
     let table: Vec<u64> = (0..65_536u64).map(|i| i.wrapping_mul(0x9E37_79B9_7F4A_7C15)).collect();
@@ -167,7 +198,7 @@ pub fn sentinel_ns() -> f64 {
         .map(|run| {
             let start = Instant::now();
             let mut x = run | 1;
-            for _ in 0..200_000 {
+            for _ in 0..60_000 {
                 x = x.wrapping_mul(0xD129_0D3B_5B92_3C45) ^ table[(x >> 48) as usize];
             }
             black_box(x);

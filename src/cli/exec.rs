@@ -44,7 +44,8 @@ pub fn run(_args: Args) -> anyhow::Result<ExitCode> {
             ExitCode::SUCCESS
         }
         Err(e) => {
-            writeln!(out, "{}", serde_json::json!({ "error": { "message": e.to_string() } }))?;
+            let (help, message) = (e.help.clone(), Error { help: None, ..e }.to_string());
+            writeln!(out, "{}", serde_json::json!({ "error": { "message": message, "help": help } }))?;
             ExitCode::from(1)
         }
     };

@@ -5,9 +5,12 @@ use crate::store::{Kind, Left, Submitted};
 use crate::worker::Event;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashSet;
-use std::io::Write;
-use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::io::{IsTerminal, Write};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Between two lines in a log.
+const PLAIN_EVERY: Duration = Duration::from_secs(15);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
@@ -21,15 +24,22 @@ pub struct Progress {
     mode: Mode,
     bar: ProgressBar,
     state: Mutex<State>,
+    /// Nobody watches: a line now and then instead of a bar.
+    plain: bool,
 }
 
 #[derive(Default)]
 struct State {
     ended: HashSet<String>,
+    /// Of these the reader was told that they failed or are wrong.
+    told: HashSet<String>,
+    last_line: Option<Instant>,
     /// Number and total milliseconds of finished trials and judgements.
     trials: (f64, f64),
     judgements: (f64, f64),
     auxiliary: f64,
+    /// A trial is under way; judgements beside it do not show.
+    measuring: bool,
 }
 
 impl Progress {
@@ -44,8 +54,9 @@ impl Progress {
         if mode == Mode::Bar {
             bar.enable_steady_tick(Duration::from_millis(500));
         }
-        let state = State { auxiliary: auxiliary as f64, ..State::default() };
-        Progress { mode, bar, state: Mutex::new(state) }
+        let state = State { auxiliary: auxiliary as f64, last_line: Some(Instant::now()), ..State::default() };
+        let plain = mode == Mode::Bar && !std::io::stderr().is_terminal();
+        Progress { mode, bar, state: Mutex::new(state), plain }
     }
 
     pub fn on(&self, event: &Event) {
@@ -56,20 +67,32 @@ impl Progress {
         }
     }
 
-    pub fn end(&self) {
+    /// Clears the bar. The runs that it already called failed or wrong.
+    pub fn end(&self) -> HashSet<String> {
         self.bar.finish_and_clear();
+        std::mem::take(&mut self.state().told)
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn say(&self, line: &str) {
+        if self.plain { eprintln!("{line}") } else { self.bar.println(line) }
     }
 
     fn draw(&self, event: &Event) {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut state = self.state();
         match event {
             Event::LaneBusy => self.bar.set_message("waiting: another study measures on this machine"),
-            Event::JobStarted { kind: Kind::Trial, run, repeat, .. } => {
-                self.bar.set_message(format!("trial {repeat} of {run}"));
+            Event::JobStarted { kind: Kind::Trial, run, repeat, take, .. } => {
+                let again = if *take > 0 { " again: it was disturbed" } else { "" };
+                self.bar.set_message(format!("{run}, repeat {}{again}", repeat + 1));
+                state.measuring = true;
             }
             // The lane is what a watcher waits for; judgements show when nothing else does.
             Event::JobStarted { kind: Kind::Judge, run, .. } => {
-                if !self.bar.message().starts_with("trial") {
+                if !state.measuring {
                     self.bar.set_message(format!("judging {run}"));
                 }
             }
@@ -78,13 +101,19 @@ impl Progress {
                 *of = (of.0 + 1.0, of.1 + wall_ms);
                 if left.trials <= 0 && *kind == Kind::Trial {
                     self.bar.set_message("judging the rest");
+                    state.measuring = false;
                 }
                 if let Some(eta) = state.eta(left) {
                     self.bar.set_prefix(format!("ETA {eta}"));
+                    if self.plain && state.last_line.is_none_or(|t| t.elapsed() > PLAIN_EVERY) {
+                        let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(0));
+                        eprintln!("{done} of {all} runs, ETA {eta}");
+                        state.last_line = Some(Instant::now());
+                    }
                 }
                 if *outcome == "crashed" {
                     let reason = reason.as_deref().unwrap_or_default();
-                    self.bar.println(format!("{run}: will be tried again: {reason}"));
+                    self.say(&format!("{run}: will be tried again: {reason}"));
                 }
             }
             Event::RunEnded { measurement_id, run, status, reason } => {
@@ -97,7 +126,8 @@ impl Progress {
                     RunStatus::Wrong => "wrong",
                     _ => return,
                 };
-                self.bar.println(format!("{word}: {run}: {}", reason.as_deref().unwrap_or_default()));
+                state.told.insert(measurement_id.clone());
+                self.say(&format!("{word}: {run}: {}", reason.as_deref().unwrap_or_default()));
             }
         }
     }
@@ -111,11 +141,15 @@ impl State {
         let lane = ms(left.trials, mean(self.trials))?;
         let beside = ms(left.judgements, mean(self.judgements))? / self.auxiliary.max(1.0);
         let s = (lane.max(beside) / 1e3).round() as u64;
-        Some(match s {
-            0..=99 => format!("{s} s"),
-            100..=5999 => format!("{} min {:02} s", s / 60, s % 60),
-            _ => format!("{} h {:02} min", s / 3600, s / 60 % 60),
-        })
+        Some(duration(s))
+    }
+}
+
+pub fn duration(s: u64) -> String {
+    match s {
+        0..=99 => format!("{s} s"),
+        100..=5999 => format!("{} min {:02} s", s / 60, s % 60),
+        _ => format!("{} h {:02} min", s / 3600, s / 60 % 60),
     }
 }
 

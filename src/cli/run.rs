@@ -1,7 +1,7 @@
 //! `cullmark run`: manifest, matrix, queue, workers, results, report.
 
 use super::check;
-use super::progress::{Mode, Progress, json_line};
+use super::progress::{Mode, Progress, duration, json_line};
 use crate::error::Error;
 use crate::machine;
 use crate::manifest::Manifest;
@@ -10,9 +10,11 @@ use crate::results::{RunStatus, StudyResults};
 use crate::store::{Cell, Detail, Store, Submission, Submitted};
 use crate::worker::child::Launcher;
 use crate::worker::{self, lane};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
 #[derive(clap::Args)]
@@ -89,7 +91,8 @@ async fn study(
     launcher: Launcher,
     machine_class: String,
 ) -> anyhow::Result<ExitCode> {
-    let auxiliary = worker::auxiliary_workers(args.workers, launcher.cores)?;
+    let start = Instant::now();
+    let auxiliary = worker::auxiliary_workers(args.workers, launcher.cores.len())?;
     let store = Store::open(&args.db).await?;
     let series = series(args, &store, &manifest.study.name).await?;
     // The lane's core was counted by the launcher, before this process left it.
@@ -120,7 +123,7 @@ async fn study(
     };
     let stop = stop_on_signal();
     let stopped = worker::work(&store, submitted.study_id, &manifest.repeat, &options, tell, stop).await;
-    progress.end();
+    let told = progress.end();
     let stopped = stopped?;
 
     let name = format!("{}@{series}", manifest.study.name);
@@ -135,7 +138,16 @@ async fn study(
         page = Some(files.page);
     }
     store.close().await;
-    Ok(conclude(mode, &results, stopped, page.as_deref()))
+    Ok(conclude(mode, &results, &End { stopped, page, told, elapsed: start.elapsed() }))
+}
+
+/// What the last words of a run are about, besides its results.
+struct End {
+    stopped: bool,
+    page: Option<PathBuf>,
+    /// Failed and wrong runs of which the reader knows.
+    told: HashSet<String>,
+    elapsed: Duration,
 }
 
 async fn series(args: &Args, store: &Store, study: &str) -> anyhow::Result<u32> {
@@ -230,44 +242,57 @@ fn stop_on_signal() -> watch::Receiver<bool> {
     receiver
 }
 
-fn conclude(mode: Mode, results: &StudyResults, stopped: bool, page: Option<&Path>) -> ExitCode {
+fn conclude(mode: Mode, results: &StudyResults, end: &End) -> ExitCode {
     let count = |status| results.runs.iter().filter(|r| r.status == status).count();
     let (done, failed, wrong, pending) =
         (count(RunStatus::Done), count(RunStatus::Failed), count(RunStatus::Wrong), count(RunStatus::Pending));
+    let noisy = results.runs.iter().filter(|r| r.trials.iter().any(|t| t.noisy)).count();
     if mode == Mode::Json {
         json_line(&serde_json::json!({
-            "event": "finished", "stopped": stopped, "done": done, "failed": failed, "wrong": wrong,
-            "pending": pending, "report": page,
+            "event": "finished", "stopped": end.stopped, "done": done, "failed": failed, "wrong": wrong,
+            "pending": pending, "noisy": noisy, "elapsed_s": end.elapsed.as_secs_f64(), "report": end.page,
         }));
     } else {
-        problems(results);
-        if mode == Mode::Bar || stopped {
+        problems(results, &end.told);
+        if mode == Mode::Bar || end.stopped {
             let mut line = format!("{done} of {} runs done", results.runs.len());
-            for (n, what) in [(failed, "failed"), (wrong, "wrong"), (pending, "not finished")] {
+            for (n, what) in [(noisy, "of them on a noisy machine"), (failed, "failed"), (wrong, "wrong")] {
                 if n > 0 {
                     line += &format!(", {n} {what}");
                 }
             }
-            eprintln!("{line}");
-            if stopped {
+            if pending > 0 {
+                line += &format!(", {pending} not finished");
+            }
+            eprintln!("{line}; {}", took(end.elapsed));
+            if end.stopped {
                 eprintln!("start it again to go on");
+            } else if failed > 0 {
+                eprintln!("--retry-failed tries the failed ones again");
             }
         }
-        if let (Some(page), Mode::Bar) = (page, mode) {
+        if let (Some(page), Mode::Bar) = (&end.page, mode) {
             println!("report: {}", page.display());
         }
     }
-    match (stopped, failed + wrong + pending) {
+    match (end.stopped, failed + wrong + pending) {
         (true, _) => ExitCode::from(INTERRUPTED),
         (_, 0) => ExitCode::SUCCESS,
         _ => ExitCode::from(1),
     }
 }
 
-/// Every failed or wrong run with its reason.
-fn problems(results: &StudyResults) {
-    let bad: Vec<_> =
-        results.runs.iter().filter(|r| matches!(r.status, RunStatus::Failed | RunStatus::Wrong)).collect();
+fn took(time: Duration) -> String {
+    if time.as_secs() < 10 { format!("{:.1} s", time.as_secs_f64()) } else { duration(time.as_secs()) }
+}
+
+/// Every failed or wrong run with its reason, unless the reader was told when it ended.
+fn problems(results: &StudyResults, told: &HashSet<String>) {
+    let bad: Vec<_> = results
+        .runs
+        .iter()
+        .filter(|r| matches!(r.status, RunStatus::Failed | RunStatus::Wrong) && !told.contains(&r.measurement_id))
+        .collect();
     let width = bad.iter().map(|r| r.scene().chars().count() + r.label().chars().count() + 2).max().unwrap_or(0);
     for r in bad {
         let word = if r.status == RunStatus::Wrong { "wrong " } else { "failed" };

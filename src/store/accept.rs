@@ -1,11 +1,12 @@
 //! Accepting results: once, whole, and on the disk before the next trial starts.
 
 use super::queue::{Accepted, Job, Kind, Lease, end_attempt, fence};
-use super::{Store, blob, now_ms};
+use super::{Store, blob, noise, now_ms};
 use crate::error::{Error, Result};
 use crate::record::{Judgement, Series, TrialRecord};
 use serde::{Deserialize, Serialize};
-use sqlx::{QueryBuilder, Sqlite, Transaction};
+use sqlx::pool::PoolConnection;
+use sqlx::{Connection, QueryBuilder, Sqlite, Transaction};
 use std::collections::BTreeMap;
 
 /// Counted work of a trial: must be equal between trials.
@@ -40,28 +41,34 @@ fn is_time(s: &Series) -> bool {
 }
 
 impl Store {
-    /// Stores a trial, once. `wall_ns` is of the whole child process.
-    /// It is on the disk when this returns.
+    /// Stores a trial, once, and whether it was disturbed. `wall_ns` is of the whole
+    /// child process. It is on the disk when this returns.
     ///
     /// # Errors
     /// When the database fails or is full.
     pub async fn accept_trial(&self, lease: &Lease, record: &TrialRecord, wall_ns: u64) -> Result<Accepted> {
         let explain = |e: sqlx::Error| self.explain("a trial", &e);
         let rows = series_rows(record, lease.job.repeat, lease.job.take);
-        self.durable(true).await?;
-        let mut tx = self.begin("a trial").await?;
+        let mut connection = self.durable().await?;
+        let mut tx = connection.begin_with("BEGIN IMMEDIATE").await.map_err(explain)?;
         let held = fence(&mut tx, lease, "done", None).await.map_err(explain)?;
         end_attempt(&mut tx, lease, if held { "accepted" } else { "fenced" }, None).await.map_err(explain)?;
+        let mut accepted = if held { Accepted::Yes } else { Accepted::Fenced };
         if held {
-            insert_trial(&mut tx, lease, record, wall_ns).await.map_err(explain)?;
+            // In the same transaction: a trial whose noise nobody weighed would pass for a quiet one.
+            let (noise, noisy) = noise::of(&mut tx, record).await.map_err(explain)?;
+            if noisy {
+                accepted = Accepted::Noisy;
+            }
+            insert_trial(&mut tx, lease, record, wall_ns, (noise, noisy)).await.map_err(explain)?;
             insert_series(&mut tx, &lease.job.target, &rows).await.map_err(explain)?;
             insert_counters(&mut tx, &lease.job.target, record).await.map_err(explain)?;
             let answer_id = answer_of(&mut tx, &lease.job).await.map_err(explain)?;
             claim_frames_hash(&mut tx, &answer_id, &record.frames_hash).await.map_err(explain)?;
         }
         tx.commit().await.map_err(explain)?;
-        self.durable(false).await?;
-        Ok(if held { Accepted::Yes } else { Accepted::Fenced })
+        self.relax(connection).await?;
+        Ok(accepted)
     }
 
     /// Stores a judgement, once. It is on the disk when this returns.
@@ -70,8 +77,8 @@ impl Store {
     /// When the database fails or is full.
     pub async fn accept_judgement(&self, lease: &Lease, judgement: &Judgement, wall_ns: u64) -> Result<Accepted> {
         let explain = |e: sqlx::Error| self.explain("a judgement", &e);
-        self.durable(true).await?;
-        let mut tx = self.begin("a judgement").await?;
+        let mut connection = self.durable().await?;
+        let mut tx = connection.begin_with("BEGIN IMMEDIATE").await.map_err(explain)?;
         let held = fence(&mut tx, lease, "done", None).await.map_err(explain)?;
         end_attempt(&mut tx, lease, if held { "accepted" } else { "fenced" }, None).await.map_err(explain)?;
         if held {
@@ -95,7 +102,7 @@ impl Store {
             claim_frames_hash(&mut tx, &answer_id, &judgement.frames_hash).await.map_err(explain)?;
         }
         tx.commit().await.map_err(explain)?;
-        self.durable(false).await?;
+        self.relax(connection).await?;
         Ok(if held { Accepted::Yes } else { Accepted::Fenced })
     }
 
@@ -142,12 +149,20 @@ impl Store {
         Ok(record)
     }
 
-    /// Leases may be lost in a power failure, results may not. `synchronous` is a
-    /// property of the one writing connection and is set between transactions.
-    async fn durable(&self, on: bool) -> Result<()> {
-        let sql = if on { "PRAGMA synchronous = FULL" } else { "PRAGMA synchronous = NORMAL" };
-        sqlx::query(sql).execute(&self.writer).await.map_err(|e| self.explain("the database's settings", &e))?;
-        Ok(())
+    /// The writing connection, set to reach the disk at every commit: leases may be
+    /// lost in a power failure, results may not. It is held from here to [`Store::relax`],
+    /// or another task of this process would set it back between the two.
+    async fn durable(&self) -> Result<PoolConnection<Sqlite>> {
+        let explain = |e: sqlx::Error| self.explain("the database's settings", &e);
+        let mut connection = self.writer.acquire().await.map_err(explain)?;
+        sqlx::query("PRAGMA synchronous = FULL").execute(&mut *connection).await.map_err(explain)?;
+        Ok(connection)
+    }
+
+    /// Whoever fails to come here leaves a connection that is safe, only slower.
+    async fn relax(&self, mut connection: PoolConnection<Sqlite>) -> Result<()> {
+        let done = sqlx::query("PRAGMA synchronous = NORMAL").execute(&mut *connection).await;
+        done.map(|_| ()).map_err(|e| self.explain("the database's settings", &e))
     }
 }
 
@@ -177,6 +192,7 @@ async fn insert_trial(
     lease: &Lease,
     record: &TrialRecord,
     wall_ns: u64,
+    (noise, noisy): (f64, bool),
 ) -> sqlx::Result<()> {
     let environment = serde_json::to_string(&record.environment).expect("an environment is plain data");
     let environment_id = blake3::hash(environment.as_bytes()).to_hex()[..32].to_string();
@@ -186,14 +202,14 @@ async fn insert_trial(
         .bind(&environment)
         .execute(&mut **tx)
         .await?;
-    let total: f64 = record.series.iter().find(|s| s.name == "cull_ns").map_or(0.0, |s| s.values.iter().sum());
-    let sentinel_ns = record.sentinel.before_ns.max(record.sentinel.after_ns);
+    let total: f64 = noise::frame_times(record).iter().sum();
+    let sentinel_ns = noise::sentinel_ns(record);
     let slim = TrialRecord { series: Vec::new(), passes_ns: Vec::new(), ..record.clone() };
     sqlx::query(
         "INSERT INTO trials (measurement_id, repeat_index, take, accepted_ms, wall_ns, total_cull_ns, build_ns, \
          prepare_ns, load_ns, peak_rss_bytes, sentinel_ns, switches, noise, noisy, environment_id, machine_class, \
          frames_hash, work_json, record_json) VALUES \
-         ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, 1, 0, $13, $14, $15, $16, $17)",
+         ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, $19)",
     )
     .bind(&lease.job.target)
     .bind(i64::from(lease.job.repeat))
@@ -207,6 +223,8 @@ async fn insert_trial(
     .bind(record.peak_rss_bytes as i64)
     .bind(sentinel_ns)
     .bind(record.sentinel.involuntary_switches as i64)
+    .bind(noise)
+    .bind(i64::from(noisy))
     .bind(&environment_id)
     .bind(&record.environment.machine_class)
     .bind(&record.frames_hash)

@@ -254,6 +254,7 @@ async fn put(tx: &mut Transaction<'_, Sqlite>, archive: Archive, label: String) 
             taken.insert(m.measurement_id.as_str());
         }
     }
+    sqlx::query(super::compact::FORGET_ATTEMPTS).execute(&mut **tx).await?;
     let mut trials_added = 0;
     for t in trials.iter().filter(|t| taken.contains(t.measurement_id.as_str())) {
         trials_added += t.insert(tx).await?;

@@ -22,6 +22,9 @@ pub struct Compacted {
 
 const ORPHANED: &str = "measurement_id NOT IN (SELECT measurement_id FROM study_runs)";
 
+/// After jobs were deleted: their numbers are given to new jobs, whose attempts would collide.
+pub(super) const FORGET_ATTEMPTS: &str = "DELETE FROM attempts WHERE job_id NOT IN (SELECT id FROM jobs)";
+
 impl Store {
     /// Drops what `drop` names and queue rows that tell nothing more, then rewrites the file.
     ///
@@ -50,6 +53,7 @@ impl Store {
                     .to_string(),
             );
         }
+        statements.push(FORGET_ATTEMPTS.to_string());
         // Accepted attempts repeat what the trial says; failed ones are evidence and stay.
         statements.push("DELETE FROM attempts WHERE outcome IN ('accepted', 'returned')".to_string());
         let mut rows_dropped = 0;

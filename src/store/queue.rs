@@ -68,6 +68,8 @@ pub struct Left {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Accepted {
     Yes,
+    /// Stored and marked: the machine was disturbed meanwhile.
+    Noisy,
     /// The lease had passed to another, who alone counts.
     Fenced,
 }
@@ -85,6 +87,10 @@ const CLAIM_JUDGE: &str = "UPDATE jobs SET state = 'leased', owner = $2, epoch =
     (SELECT 1 FROM jobs b WHERE b.kind = 'judge' AND b.group_key = j.group_key AND b.state = 'leased') AND NOT EXISTS \
     (SELECT 1 FROM jobs b WHERE b.kind = 'judge' AND b.group_key = j.group_key AND b.state = 'done')) \
     ORDER BY j.order_key LIMIT 1) RETURNING id, target, repeat_index, take, epoch";
+
+/// Since the job was last queued anew: `attempts` then began at nought, epochs never do.
+const CRASHES: &str = "SELECT count(*) FROM attempts a JOIN jobs j ON j.id = a.job_id \
+    WHERE a.job_id = $1 AND a.outcome = 'crashed' AND a.epoch > j.epoch - j.attempts";
 
 impl Store {
     /// Leases the next job of `kind` in `study_id`, if one waits.
@@ -212,11 +218,7 @@ impl Store {
         };
         let mut tx = self.begin("a failure").await?;
         let (crashes,): (i64,) =
-            sqlx::query_as("SELECT count(*) FROM attempts WHERE job_id = $1 AND outcome = 'crashed'")
-                .bind(lease.job.id)
-                .fetch_one(&mut *tx)
-                .await
-                .map_err(explain)?;
+            sqlx::query_as(CRASHES).bind(lease.job.id).fetch_one(&mut *tx).await.map_err(explain)?;
         let last = name != "crashed" || crashes + 1 >= CRASH_LIMIT;
         let reason = if name == "crashed" && last {
             format!("{reason} (attempt {} of it)", crashes + 1)
@@ -308,10 +310,17 @@ pub(super) async fn fence(
     state: &str,
     reason: Option<&str>,
 ) -> sqlx::Result<bool> {
+    // The target too: SQLite may have given the number of a deleted job to another one.
     let sql = "UPDATE jobs SET state = $3, reason = $4, owner = NULL, lease_until_ms = 0 \
-               WHERE id = $1 AND epoch = $2 AND state = 'leased'";
-    let done =
-        sqlx::query(sql).bind(lease.job.id).bind(lease.epoch).bind(state).bind(reason).execute(&mut **tx).await?;
+               WHERE id = $1 AND epoch = $2 AND state = 'leased' AND target = $5";
+    let done = sqlx::query(sql)
+        .bind(lease.job.id)
+        .bind(lease.epoch)
+        .bind(state)
+        .bind(reason)
+        .bind(&lease.job.target)
+        .execute(&mut **tx)
+        .await?;
     Ok(done.rows_affected() == 1)
 }
 

@@ -68,6 +68,27 @@ impl Store {
         .map_err(|e| self.explain("reading the study", &e))
     }
 
+    /// Measurements of the study about which something is to be decided: nobody works on
+    /// them any more, or what ends them is known. The others are settled as their trials come in.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn loose_ends(&self, study_id: i64) -> Result<Vec<String>> {
+        sqlx::query_scalar(
+            "SELECT m.measurement_id FROM measurements m JOIN study_runs r ON r.measurement_id = m.measurement_id \
+             WHERE r.study_id = $1 AND m.status = 'pending' AND (NOT EXISTS (SELECT 1 FROM jobs j WHERE \
+             j.kind = 'trial' AND j.target = m.measurement_id AND j.state IN ('queued', 'leased')) OR EXISTS \
+             (SELECT 1 FROM judgements g WHERE g.judgement_id = m.judgement_id AND g.wrong IS NOT NULL) OR EXISTS \
+             (SELECT 1 FROM jobs j WHERE j.kind = 'trial' AND j.target = m.measurement_id AND j.state = 'failed') OR \
+             EXISTS (SELECT 1 FROM jobs j WHERE j.kind = 'judge' AND j.target = m.judgement_id AND j.state = 'failed')) \
+             GROUP BY m.measurement_id ORDER BY min(r.ordinal)",
+        )
+        .bind(study_id)
+        .fetch_all(&self.writer)
+        .await
+        .map_err(|e| self.explain("reading the study", &e))
+    }
+
     /// How the run is called in progress and logs.
     ///
     /// # Errors

@@ -34,8 +34,8 @@ pub struct Launcher {
     pub exe: PathBuf,
     /// The measuring lane's core, kept free of everything else of ours.
     pub lane_core: Option<u32>,
-    /// All cores, counted before this process left the lane's.
-    pub cores: u32,
+    /// All cores we may use, asked before this process left the lane's.
+    pub cores: Vec<u32>,
 }
 
 /// How a child ended.
@@ -69,13 +69,13 @@ impl Launcher {
     pub fn here() -> Result<Launcher> {
         let exe = std::env::current_exe()
             .map_err(|e| Error::new(format!("the path of the running program is unknown: {e}")))?;
-        Ok(Launcher { exe, lane_core: machine::measuring_core(), cores: machine::core_count() })
+        Ok(Launcher { exe, lane_core: machine::measuring_core(), cores: machine::cores().to_vec() })
     }
 
     /// Keeps this thread, and those it starts later, off the measuring lane.
     /// Best effort: a container may forbid it, and the sentinel then tells.
     pub fn leave_the_lane(&self) {
-        let auxiliary: Vec<u32> = (0..self.cores).filter(|c| Some(*c) != self.lane_core).collect();
+        let auxiliary = machine::auxiliary_cores(self.lane_core);
         if self.lane_core.is_some() && !auxiliary.is_empty() {
             let _ = machine::pin_to(&auxiliary);
         }
@@ -125,7 +125,7 @@ impl Launcher {
         die_with_worker(&mut command);
         // Affinity is inherited: a trial may build on every core and then pins itself to the lane.
         if kind == Kind::Trial && self.lane_core.is_some() {
-            let _ = machine::pin_to(&(0..self.cores).collect::<Vec<_>>());
+            let _ = machine::pin_to(&self.cores);
         }
         let child = command.spawn();
         self.leave_the_lane();
@@ -159,11 +159,16 @@ impl Drop for Group {
 
 #[cfg(target_os = "linux")]
 fn die_with_worker(command: &mut Command) {
-    // SAFETY: between fork and exec only prctl is called, which is
-    // async-signal-safe and touches no memory of ours.
+    let worker = std::process::id();
+    // SAFETY: between fork and exec only prctl, getppid and _exit are called, which
+    // are async-signal-safe and touch no memory of ours.
     unsafe {
-        command.pre_exec(|| {
+        command.pre_exec(move || {
             libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL);
+            // The worker may have died before the system knew of our wish.
+            if libc::getppid() as u32 != worker {
+                libc::_exit(1);
+            }
             Ok(())
         });
     }

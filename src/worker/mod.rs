@@ -15,7 +15,6 @@ use crate::store::{self, Accepted, Kind, Lease, Left, Outcome, Settled, Store, q
 use child::{Ended, Launcher, Request};
 use lane::Lane;
 use serde::Serialize;
-use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -27,6 +26,9 @@ const JUDGE_TIME: f64 = 10.0;
 
 /// How long an idle worker rests before it looks again.
 const REST: Duration = Duration::from_millis(30);
+
+/// How often the jobs left are counted in the database.
+const RECOUNT: Duration = Duration::from_secs(2);
 
 /// What a crew of workers needs to know besides the store.
 #[derive(Debug, Clone)]
@@ -49,6 +51,8 @@ pub enum Event {
         measurement_id: String,
         run: String,
         repeat: u32,
+        /// 1: a disturbed repeat is measured a second time.
+        take: u32,
     },
     JobEnded {
         kind: Kind,
@@ -81,6 +85,7 @@ struct Crew {
     tell: Listener,
     stop: watch::Receiver<bool>,
     left: Mutex<Left>,
+    counted: Mutex<Instant>,
 }
 
 /// Works until the study has no job left, or `stop` turns true. True if it was stopped.
@@ -104,6 +109,7 @@ pub async fn work(
         tell,
         stop,
         left: Mutex::new(Left::default()),
+        counted: Mutex::new(Instant::now()),
     });
     store.return_orphans().await?;
     // A process may have died between accepting a trial and drawing the conclusion.
@@ -180,6 +186,20 @@ impl Crew {
         self.left.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Another process may work on the same study: from time to time its share is taken into account.
+    async fn count_again(&self) -> Result<()> {
+        {
+            let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
+            if counted.elapsed() < RECOUNT {
+                return Ok(());
+            }
+            *counted = Instant::now();
+        }
+        let left = self.store.jobs_left(self.study_id).await?;
+        *self.left() = left;
+        Ok(())
+    }
+
     fn stopped(&self) -> bool {
         *self.stop.borrow()
     }
@@ -203,6 +223,7 @@ impl Crew {
             measurement_id: lease.job.target.clone(),
             run: run.clone(),
             repeat: lease.job.repeat,
+            take: lease.job.take,
         });
         let start = Instant::now();
         let (outcome, reason) = match kind {
@@ -224,6 +245,7 @@ impl Crew {
         for id in concerned {
             self.settle(&id, &run).await?;
         }
+        self.count_again().await?;
         (self.tell)(Event::JobEnded {
             kind,
             measurement_id: lease.job.target.clone(),
@@ -247,12 +269,7 @@ impl Crew {
             other => return self.failed(lease, other).await,
         };
         let wall_ns = start.elapsed().as_nanos() as u64;
-        if self.store.accept_trial(lease, &record, wall_ns).await? == Accepted::Fenced {
-            return Ok(("fenced", None));
-        }
-        let timed: u64 = record.passes_ns.iter().map(|p| p.len() as u64).sum();
-        let noisy = self.store.mark_noise(&lease.job.target, lease.job.repeat, lease.job.take, timed).await?;
-        Ok((if noisy { "noisy" } else { "accepted" }, None))
+        Ok((accepted(self.store.accept_trial(lease, &record, wall_ns).await?), None))
     }
 
     async fn judge(&self, lease: &Lease, start: Instant) -> Result<(&'static str, Option<String>)> {
@@ -266,10 +283,7 @@ impl Crew {
             other => return self.failed(lease, other).await,
         };
         let wall_ns = start.elapsed().as_nanos() as u64;
-        Ok(match self.store.accept_judgement(lease, &judgement, wall_ns).await? {
-            Accepted::Yes => ("accepted", None),
-            Accepted::Fenced => ("fenced", None),
-        })
+        Ok((accepted(self.store.accept_judgement(lease, &judgement, wall_ns).await?), None))
     }
 
     async fn failed<T>(&self, lease: &Lease, ended: Ended<T>) -> Result<(&'static str, Option<String>)> {
@@ -325,12 +339,9 @@ impl Crew {
     /// Settles what is open and nobody works on; the number of jobs that this added.
     async fn settle_all(&self) -> Result<u32> {
         let mut added = 0;
-        let mut seen = HashSet::new();
-        for id in self.store.unsettled(self.study_id, None).await? {
-            if seen.insert(id.clone()) {
-                let run = self.store.label_of(self.study_id, &id).await?;
-                added += self.settle(&id, &run).await?.trials_added;
-            }
+        for id in self.store.loose_ends(self.study_id).await? {
+            let run = self.store.label_of(self.study_id, &id).await?;
+            added += self.settle(&id, &run).await?.trials_added;
         }
         Ok(added)
     }
@@ -350,11 +361,19 @@ impl Crew {
     }
 }
 
+fn accepted(how: Accepted) -> &'static str {
+    match how {
+        Accepted::Yes => "accepted",
+        Accepted::Noisy => "noisy",
+        Accepted::Fenced => "fenced",
+    }
+}
+
 /// How many workers beside the measuring one suit this machine.
-pub fn auxiliary_workers(asked: Option<usize>, cores: u32) -> Result<usize> {
+pub fn auxiliary_workers(asked: Option<usize>, cores: usize) -> Result<usize> {
     match asked {
         Some(0) => Err(Error::new("--workers must be at least 1").help("leave it out for one worker a spare core")),
         Some(n) => Ok(n),
-        None => Ok((cores as usize).saturating_sub(1).max(1)),
+        None => Ok(cores.saturating_sub(1).max(1)),
     }
 }

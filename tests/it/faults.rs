@@ -50,7 +50,7 @@ impl Town {
     /// `cullmark run` here, with a measuring lane of its own.
     fn command(&self, more: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_cullmark"));
-        command.current_dir(self.path()).env("TMPDIR", self.path());
+        command.current_dir(self.path()).env("CULLMARK_LANE", self.path().join("lane"));
         command.args(["run", "town.toml", "--db", "x.db", "--no-report", "--json"]).args(more);
         command
     }

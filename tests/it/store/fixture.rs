@@ -140,7 +140,6 @@ pub(super) async fn finish(store: &Store, study: i64, policy: &RepeatPolicy, mak
         }
         while let Some(l) = store.lease(study, Kind::Trial).await.unwrap() {
             store.accept_trial(&l, &make(&l), 1_000_000).await.unwrap();
-            store.mark_noise(&l.job.target, l.job.repeat, l.job.take, 40).await.unwrap();
             store.settle(study, &l.job.target, policy).await.unwrap();
             worked = true;
         }
