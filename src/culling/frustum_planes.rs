@@ -11,15 +11,15 @@
 //! ```text
 //! a_i = c_i - h_i          one rounding:      |error| <= u |a_i|
 //! n^  = f32(n)             one rounding:      |error| <= u |n_i| + 2^-150
-//! s   = ((n^x ax + n^y ay) + n^z az) + D      gamma_4 on x and y, gamma_3 on z, gamma_1 on D
-//! g   = 4u sum_i (|lo_i + hi_i| + |hi_i - lo_i|)  = 8u A,  A = sum_i max(|lo_i|, |hi_i|)
+//! s   = n^z az + (n^y ay + (n^x ax + D))      fused: three roundings in all
+//! g   = 8u sum_i (|lo_i| + |hi_i|) >= 8u A,   A = sum_i max(|lo_i|, |hi_i|)
 //! ```
 //! (in `g`, `lo` and `hi` are relative). As `|n_i| <= 1`, the error of `s` from
-//! the coordinates, the normal and the sum is at most `(1 + 1 + 4) u A (1 + O(u))`,
-//! six of the eight `u A` in `g`, which its own five roundings cannot use up.
-//! The rounding that the last addition makes on account of `D`, the f64 errors of
-//! `d'` and underflow are in [`FramePlanes::d_out`] and `d_in`, which are `d'`
-//! moved outward and rounded in that direction. Therefore
+//! the coordinates, the normal and the sum is at most `(1 + 1 + 3) u A (1 + O(u))`,
+//! five of the eight `u A` in `g`, which its own four roundings cannot use up.
+//! What the three roundings make on account of `D`, the f64 errors of `d'` and
+//! underflow are in [`FramePlanes::d_out`] and `d_in`, which are `d'` moved
+//! outward and rounded in that direction. Therefore
 //!
 //! - `s(p-vertex) < -g` proves that the box is outside the plane,
 //! - `s(n-vertex) >  g` proves that it is inside.
@@ -28,16 +28,17 @@
 //! bounds is NaN and infinite when one is infinite, and both comparisons are then
 //! false for every plane: such a box is kept (fact B5.4).
 //!
-//! No fused multiply-add and one order of association: scalar, AVX2 and AVX-512
-//! give the same bits.
+//! Every step is an IEEE operation in one stated order, and the multiply-adds are
+//! fused on every target (in software where the processor cannot), so scalar,
+//! AVX2 and AVX-512 give the same bits.
 
 use crate::math::{DVec3, View};
 
 /// left, right, bottom, top, near, far.
 pub const MAX_PLANES: usize = 6;
 
-/// Guard on each axis: half of 8u, as `|lo + hi| + |hi - lo|` is twice the maximum.
-pub const GUARD: f32 = 4.0 / (1u32 << 24) as f32;
+/// Guard on the sum of magnitudes: 8u.
+pub const GUARD: f32 = 8.0 / (1u32 << 24) as f32;
 
 /// One plane in f32, camera-relative, with the corner choice that the sign of its
 /// normal fixes for the frame.
@@ -76,7 +77,7 @@ impl FramePlanes {
         }
         for (out, plane) in frame.planes.iter_mut().zip(&view.planes) {
             let d = plane.offset_m - plane.normal.dot(rest);
-            // 2u for the last addition, 2^-48 for f64, 2^-120 for underflow.
+            // 4u for the three roundings, 2^-48 for f64, 2^-120 for underflow.
             let slack = d.abs() * (-22f64).exp2()
                 + (plane.offset_m.abs() + rest.abs().element_sum()) * (-48f64).exp2()
                 + (-120f64).exp2();

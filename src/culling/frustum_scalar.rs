@@ -11,7 +11,7 @@ pub fn relative(frame: &FramePlanes, bounds: &BoundsBlock, lane: usize) -> ([f32
     let mut magnitude = [0f32; 3];
     for axis in 0..3 {
         let (lo, hi) = (bounds.lo[axis][lane] - frame.eye[axis], bounds.hi[axis][lane] - frame.eye[axis]);
-        magnitude[axis] = (lo + hi).abs() + (hi - lo).abs();
+        magnitude[axis] = lo.abs() + hi.abs();
         (a[axis], a[axis + 3]) = (lo, hi);
     }
     (a, ((magnitude[0] + magnitude[1]) + magnitude[2]) * GUARD)
@@ -21,7 +21,7 @@ pub fn relative(frame: &FramePlanes, bounds: &BoundsBlock, lane: usize) -> ([f32
 #[inline]
 pub fn value(plane: &Plane32, a: &[f32; 6], corner: &[usize; 3], d: f32) -> f32 {
     let [nx, ny, nz] = plane.normal;
-    ((nx * a[corner[0]] + ny * a[corner[1]]) + nz * a[corner[2]]) + d
+    nz.mul_add(a[corner[2]], ny.mul_add(a[corner[1]], nx.mul_add(a[corner[0]], d)))
 }
 
 /// Judges 8 boxes against the planes whose bit is set in `wanted`; entries of

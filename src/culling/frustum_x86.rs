@@ -4,12 +4,12 @@
 //! loops when it vectorises them for AVX-512, so none stands in a function that
 //! enables it. The operations and their order are those of `frustum_scalar`.
 
-use super::frustum_planes::{FramePlanes, GUARD, PlaneMasks, Work};
+use super::frustum_planes::{FramePlanes, GUARD, Plane32, PlaneMasks, Work};
 use crate::hierarchy::BoundsBlock;
 use std::arch::x86_64::*;
 
 pub fn has_avx2() -> bool {
-    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt")
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") && is_x86_feature_detected!("popcnt")
 }
 
 pub fn has_avx512() -> bool {
@@ -51,8 +51,10 @@ pub fn flat_avx512(frame: &FramePlanes, bounds: &[BoundsBlock], live: &[u8], out
     // SAFETY: the processor has the features, as just asserted.
     unsafe {
         match frame.count {
-            5 => flat_512::<5>(frame, bounds, live, outside),
-            6 => flat_512::<6>(frame, bounds, live, outside),
+            5 if bounds.len() > NEAR => flat_512::<5, true>(frame, bounds, live, outside),
+            5 => flat_512::<5, false>(frame, bounds, live, outside),
+            6 if bounds.len() > NEAR => flat_512::<6, true>(frame, bounds, live, outside),
+            6 => flat_512::<6, false>(frame, bounds, live, outside),
             count => unreachable!("a view has 5 or 6 planes, not {count}"),
         }
     }
@@ -70,22 +72,21 @@ fn relative_256(eye: &[__m256; 3], bounds: &BoundsBlock) -> ([__m256; 8], __m256
         // SAFETY: a row of 8 f32 is 32 bytes, and rows are 32-byte aligned in the 64-byte aligned block.
         let (lo, hi) = unsafe { (_mm256_load_ps(bounds.lo[axis].as_ptr()), _mm256_load_ps(bounds.hi[axis].as_ptr())) };
         let (lo, hi) = (_mm256_sub_ps(lo, eye[axis]), _mm256_sub_ps(hi, eye[axis]));
-        let sum = _mm256_and_ps(_mm256_add_ps(lo, hi), positive);
-        let size = _mm256_and_ps(_mm256_sub_ps(hi, lo), positive);
-        magnitude[axis] = _mm256_add_ps(sum, size);
+        magnitude[axis] = _mm256_add_ps(_mm256_and_ps(lo, positive), _mm256_and_ps(hi, positive));
         (a[axis], a[axis + 3]) = (lo, hi);
     }
     let total = _mm256_add_ps(_mm256_add_ps(magnitude[0], magnitude[1]), magnitude[2]);
     (a, _mm256_mul_ps(total, _mm256_set1_ps(GUARD)))
 }
 
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,fma")]
 #[inline]
 fn value_256(normal: &[f32; 3], a: &[__m256; 8], corner: &[usize; 3], d: f32) -> __m256 {
-    let x = _mm256_mul_ps(_mm256_set1_ps(normal[0]), a[corner[0] & 7]);
-    let y = _mm256_mul_ps(_mm256_set1_ps(normal[1]), a[corner[1] & 7]);
-    let z = _mm256_mul_ps(_mm256_set1_ps(normal[2]), a[corner[2] & 7]);
-    _mm256_add_ps(_mm256_add_ps(_mm256_add_ps(x, y), z), _mm256_set1_ps(d))
+    let mut s = _mm256_set1_ps(d);
+    for axis in 0..3 {
+        s = _mm256_fmadd_ps(_mm256_set1_ps(normal[axis]), a[corner[axis] & 7], s);
+    }
+    s
 }
 
 #[target_feature(enable = "avx2")]
@@ -94,7 +95,7 @@ fn negated_256(x: __m256) -> __m256 {
     _mm256_xor_ps(x, _mm256_set1_ps(-0.0))
 }
 
-#[target_feature(enable = "avx2,popcnt")]
+#[target_feature(enable = "avx2,fma,popcnt")]
 fn block_256(frame: &FramePlanes, bounds: &BoundsBlock, wanted: u8, want_inside: bool, out: &mut PlaneMasks) {
     let eye = frame.eye.map(|e| _mm256_set1_ps(e));
     let (a, guard) = relative_256(&eye, bounds);
@@ -113,7 +114,7 @@ fn block_256(frame: &FramePlanes, bounds: &BoundsBlock, wanted: u8, want_inside:
     }
 }
 
-#[target_feature(enable = "avx2,popcnt")]
+#[target_feature(enable = "avx2,fma,popcnt")]
 fn flat_256<const N: usize>(frame: &FramePlanes, bounds: &[BoundsBlock], live: &[u8], outside: &mut [u8]) -> Work {
     let eye = frame.eye.map(|e| _mm256_set1_ps(e));
     let mut work = Work::default();
@@ -132,47 +133,75 @@ fn flat_256<const N: usize>(frame: &FramePlanes, bounds: &[BoundsBlock], live: &
     work
 }
 
-/// Two rows of 8 as one register.
+/// Rows `2 i` and `2 i + 1` of two blocks (in memory order: lo x, lo y, lo z, hi x,
+/// hi y, hi z), each row of 16 as one register.
 #[target_feature(enable = "avx512f,avx512dq")]
 #[inline]
-fn load_pair(a: &[f32; 8], b: &[f32; 8]) -> __m512 {
-    // SAFETY: each row is 32 bytes; unaligned loads ask for no alignment.
-    let (a, b) = unsafe { (_mm256_loadu_ps(a.as_ptr()), _mm256_loadu_ps(b.as_ptr())) };
-    _mm512_insertf32x8::<1>(_mm512_castps256_ps512(a), b)
+fn load_rows(first: &BoundsBlock, second: &BoundsBlock, i: usize) -> (__m512, __m512) {
+    const { assert!(size_of::<BoundsBlock>() == 3 * size_of::<__m512>() && align_of::<BoundsBlock>() == 64) };
+    // SAFETY: i is below 3, and a block is three 64-byte aligned registers of f32.
+    let (a, b) = unsafe {
+        debug_assert!(i < 3);
+        let row = |block: &BoundsBlock| _mm512_load_ps(std::ptr::from_ref(block).cast::<f32>().add(16 * i));
+        (row(first), row(second))
+    };
+    (_mm512_shuffle_f32x4::<0b01_00_01_00>(a, b), _mm512_shuffle_f32x4::<0b11_10_11_10>(a, b))
 }
 
+/// Blocks between the one judged and the one prefetched: 6 KiB.
+const AHEAD: usize = 32;
+
+/// Blocks that a second-level cache of 1 MiB surely holds; more are prefetched.
+const NEAR: usize = 4096;
+
 #[target_feature(enable = "avx512f,avx512dq,popcnt")]
-fn flat_512<const N: usize>(frame: &FramePlanes, bounds: &[BoundsBlock], live: &[u8], outside: &mut [u8]) -> Work {
-    let eye = frame.eye.map(|e| _mm512_set1_ps(e));
+fn flat_512<const N: usize, const FAR: bool>(
+    frame: &FramePlanes,
+    bounds: &[BoundsBlock],
+    live: &[u8],
+    outside: &mut [u8],
+) -> Work {
+    // All that is the same for every box stays in registers: the loop is bound by its loads.
+    let [ex, ey, ez] = frame.eye.map(|e| _mm512_set1_ps(e));
+    let planes: [&Plane32; N] = std::array::from_fn(|k| &frame.planes[k]);
+    let normals = planes.map(|p| p.normal.map(|n| _mm512_set1_ps(n)));
+    let offsets = planes.map(|p| _mm512_set1_ps(p.d_out));
+    let corners = planes.map(|p| p.p.map(|c| c & 7));
+    let minus_guard = _mm512_set1_ps(-GUARD);
     let mut work = Work::default();
     let count = bounds.len().min(live.len()).min(outside.len());
     let mut at = 0;
     while at < count {
         // An odd last block is judged beside itself, with no lane of the copy alive.
         let second = (at + 1).min(count - 1);
-        let (first_block, second_block) = (&bounds[at], &bounds[second]);
-        let mut a = [_mm512_setzero_ps(); 8];
-        let mut magnitude = [_mm512_setzero_ps(); 3];
-        for axis in 0..3 {
-            let lo = _mm512_sub_ps(load_pair(&first_block.lo[axis], &second_block.lo[axis]), eye[axis]);
-            let hi = _mm512_sub_ps(load_pair(&first_block.hi[axis], &second_block.hi[axis]), eye[axis]);
-            let sum = _mm512_abs_ps(_mm512_add_ps(lo, hi));
-            magnitude[axis] = _mm512_add_ps(sum, _mm512_abs_ps(_mm512_sub_ps(hi, lo)));
-            (a[axis], a[axis + 3]) = (lo, hi);
+        let (blocks, others) = (&bounds[at], &bounds[second]);
+        if FAR {
+            // The hardware prefetcher stops at page ends; an address past the slice is only a hint.
+            let ahead = bounds.as_ptr().wrapping_add(at + AHEAD).cast::<i8>();
+            for line in 0..6 {
+                _mm_prefetch::<_MM_HINT_T0>(ahead.wrapping_add(64 * line));
+            }
         }
-        let total = _mm512_add_ps(_mm512_add_ps(magnitude[0], magnitude[1]), magnitude[2]);
-        let below = _mm512_mul_ps(total, _mm512_set1_ps(-GUARD));
+        let (lo_x, lo_y) = load_rows(blocks, others, 0);
+        let (lo_z, hi_x) = load_rows(blocks, others, 1);
+        let (hi_y, hi_z) = load_rows(blocks, others, 2);
+        let (lo_x, lo_y, lo_z) = (_mm512_sub_ps(lo_x, ex), _mm512_sub_ps(lo_y, ey), _mm512_sub_ps(lo_z, ez));
+        let (hi_x, hi_y, hi_z) = (_mm512_sub_ps(hi_x, ex), _mm512_sub_ps(hi_y, ey), _mm512_sub_ps(hi_z, ez));
+        let size = |lo, hi| _mm512_add_ps(_mm512_abs_ps(lo), _mm512_abs_ps(hi));
+        let total = _mm512_add_ps(_mm512_add_ps(size(lo_x, hi_x), size(lo_y, hi_y)), size(lo_z, hi_z));
+        let below = _mm512_mul_ps(total, minus_guard);
+        let a = [lo_x, lo_y, lo_z, hi_x, hi_y, hi_z, ex, ex];
         let mut left = u32::from(live[at] & !outside[at]);
         if second > at {
             left |= u32::from(live[second] & !outside[second]) << 8;
         }
         work.lanes += u64::from(left.count_ones());
-        for plane in &frame.planes[..N] {
+        for k in 0..N {
             work.planes += u64::from(left.count_ones());
-            let x = _mm512_mul_ps(_mm512_set1_ps(plane.normal[0]), a[plane.p[0] & 7]);
-            let y = _mm512_mul_ps(_mm512_set1_ps(plane.normal[1]), a[plane.p[1] & 7]);
-            let z = _mm512_mul_ps(_mm512_set1_ps(plane.normal[2]), a[plane.p[2] & 7]);
-            let s = _mm512_add_ps(_mm512_add_ps(_mm512_add_ps(x, y), z), _mm512_set1_ps(plane.d_out));
+            let [nx, ny, nz] = normals[k];
+            let [cx, cy, cz] = corners[k];
+            let s = _mm512_fmadd_ps(nx, a[cx], offsets[k]);
+            let s = _mm512_fmadd_ps(nz, a[cz], _mm512_fmadd_ps(ny, a[cy], s));
             left &= !u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(s, below));
         }
         outside[at] = !left as u8;
