@@ -2,7 +2,7 @@
 //! scene, culled by the frustum, and judged by the oracle.
 
 use cullmark::culling::{make_tests, make_walk};
-use cullmark::hierarchy::{BoundsBlock, BuildStats, Hierarchy, LANES, LinkBlock, NONE};
+use cullmark::hierarchy::{BoundsBlock, Hierarchy, LANES, LinkBlock, NONE};
 use cullmark::math::{Box32, Camera};
 use cullmark::record::Accuracy;
 use cullmark::registry::{Spec, parse_sum};
@@ -35,7 +35,6 @@ impl Structure for Slabs {
             first = end;
         }
         h.root_blocks = h.links.len() as u32;
-        h.stats = BuildStats { nodes: h.node_count() as u64, leaves: h.node_count() as u64, ..Default::default() };
         h.entries = entries;
         h.number_material_runs(scene);
         h.assert_well_formed(scene);
@@ -53,10 +52,7 @@ fn main() -> Result<()> {
     let truth = oracle::truth(&setup.scene, &Camera::default(), &setup.judged_poses(&accuracy), &accuracy);
     let judgement = setup.judge(&truth);
     for f in &judgement.frames {
-        println!(
-            "frame {}: {} submitted, {} visible, {} falsely culled",
-            f.frame, f.submitted, f.visible, f.false_culls
-        );
+        println!("{}: {} submitted, {} visible, {} lost", f.frame, f.submitted, f.visible, f.false_culls);
     }
     assert_eq!(judgement.wrong, None, "slabs must be conservative");
     Ok(())

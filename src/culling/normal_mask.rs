@@ -117,12 +117,29 @@ impl Cells {
     fn words(self) -> usize {
         (self.count() + 1).div_ceil(64)
     }
+
+    /// Every corner of the six faces once, `(per_edge + 1)^2` a face in the order
+    /// of cells, with its length: up to four cells share one.
+    fn lattice(self) -> Vec<(DVec3, f64)> {
+        let s = self.per_edge;
+        let corner = |face: usize, i: usize, j: usize| {
+            let cell = (face * s + i.min(s - 1)) * s + j.min(s - 1);
+            self.corners(cell)[[[0, 3], [1, 2]][usize::from(i == s)][usize::from(j == s)]]
+        };
+        let rows = (0..6).flat_map(|face| (0..=s).map(move |i| (face, i)));
+        let all = rows.flat_map(|(face, i)| (0..=s).map(move |j| corner(face, i, j)));
+        all.map(|q| (q, q.length())).collect()
+    }
 }
 
 /// The test. Column: `words` x 8 lanes of mask words a block.
 pub struct NormalMask {
     cells: Cells,
     masks: Vec<[u64; LANES]>,
+    /// Corners of all cells and their lengths.
+    lattice: Vec<(DVec3, f64)>,
+    /// By corner: averted from all rays of this frame.
+    averted: Vec<bool>,
     /// Bit set: the cell may hold front-facing normals this frame.
     front: Vec<u64>,
     all_front: bool,
@@ -131,7 +148,9 @@ pub struct NormalMask {
 impl NormalMask {
     pub fn new(cells: usize) -> NormalMask {
         let cells = Cells { per_edge: cells };
-        NormalMask { cells, masks: Vec::new(), front: vec![!0; cells.words()], all_front: true }
+        let lattice = cells.lattice();
+        let averted = vec![false; lattice.len()];
+        NormalMask { cells, masks: Vec::new(), lattice, averted, front: vec![!0; cells.words()], all_front: true }
     }
 }
 
@@ -171,12 +190,25 @@ impl Test for NormalMask {
     }
 
     fn begin(&mut self, view: &View, _hierarchy: &Hierarchy) {
-        let rays = view.corner_rays();
+        let rays = view.corner_rays().map(|r| (r, r.length()));
+        // Each corner once, where `Cells::is_averted`, the naive twin, asks it for
+        // every cell around it; most corners fail at the first ray.
+        for (averted, (q, length)) in self.averted.iter_mut().zip(&self.lattice) {
+            *averted = rays.iter().all(|(r, r_length)| q.dot(*r) >= GUARD * (length * r_length));
+        }
         self.front.fill(!0);
         self.all_front = true;
-        for cell in (0..self.cells.count()).filter(|c| self.cells.is_averted(*c, &rays)) {
-            self.front[cell / 64] &= !(1 << (cell % 64));
-            self.all_front = false;
+        let s = self.cells.per_edge;
+        let faces = self.averted.chunks_exact((s + 1) * (s + 1)).enumerate();
+        for (face, corners) in faces.filter(|(_, corners)| corners.contains(&true)) {
+            for i in 0..s {
+                let (row, next) = (&corners[i * (s + 1)..][..=s], &corners[(i + 1) * (s + 1)..][..=s]);
+                for j in (0..s).filter(|j| row[*j] && row[j + 1] && next[*j] && next[j + 1]) {
+                    let cell = (face * s + i) * s + j;
+                    self.front[cell / 64] &= !(1 << (cell % 64));
+                    self.all_front = false;
+                }
+            }
         }
     }
 
@@ -204,5 +236,36 @@ impl Test for NormalMask {
         }
         verdict.outside &= live;
         verdict
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Camera, Pose, Projection};
+
+    #[test]
+    fn asking_each_shared_corner_once_gives_the_cells_that_asking_each_cell_does() {
+        let fovs = [1e-4, 0.3, 1.0, 1.6, 3.0];
+        for (i, fov_y_rad) in fovs.into_iter().chain([f64::NAN]).enumerate() {
+            let projection = match fov_y_rad.is_nan() {
+                true => Projection::Orthographic { height_m: 3.0 },
+                false => Projection::Perspective { fov_y_rad },
+            };
+            let camera = Camera { projection, ..Camera::default() };
+            // Also axes that lie exactly on corners and edges of cells.
+            for forward in [DVec3::X, DVec3::NEG_Y, DVec3::new(1.0, 1.0, 0.0), DVec3::new(0.3, -0.8, 0.2 * i as f64)] {
+                let view = View::new(&camera, &Pose { eye: DVec3::ZERO, forward, up: DVec3::new(0.0, 0.1, 1.0) });
+                for per_edge in [1, 2, 4, 5, 18] {
+                    let mut test = NormalMask::new(per_edge);
+                    test.begin(&view, &Hierarchy::default());
+                    let front = |cell: usize| test.front[cell / 64] >> (cell % 64) & 1 == 1;
+                    for cell in 0..test.cells.count() {
+                        assert_eq!(front(cell), !test.cells.is_averted(cell, &view.corner_rays()), "{per_edge} {cell}");
+                    }
+                    assert!(front(test.cells.count()), "the reserved cell is always front");
+                }
+            }
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Tests: oracle. Here the item buffer against a ray caster that shares nothing
 //! with it; below, judgements, truth files, every method, and `inspect`.
 
+mod extremes;
 mod files;
 mod inspect;
 mod judgement;
