@@ -153,7 +153,8 @@ fn a_memory_limit_fails_its_run_and_says_so() {
 #[cfg(target_os = "linux")]
 fn a_killed_child_is_named_and_its_trial_taken_again() {
     let town = Town::new(4);
-    let mut run = town.start(&["--set", "measure.repeats=6"]);
+    // Trials alone, one after the other: a kill meant for the first attempt must not meet the second.
+    let mut run = town.start(&["--set", "measure.repeats=6", "--set", "accuracy.frames=0"]);
     let mut lines = BufReader::new(run.stdout.take().unwrap()).lines();
     let (mut seen, mut killed) = (Vec::<Value>::new(), 0);
     while let Some(line) = lines.next() {
@@ -298,4 +299,38 @@ fn a_full_disk_is_said_and_what_was_stored_stays() {
         assert!(e.contains("the disk is full") && e.contains("x.db") && e.contains("compact"), "{e}");
         assert_eq!(store.results("town").await.unwrap().runs.len(), 4);
     });
+}
+
+/// What a study answers, without what may differ from run to run: its times.
+fn answers(town: &Town) -> Vec<String> {
+    block_on(async {
+        let store = Store::open_existing(&town.path().join("x.db")).await.unwrap();
+        let runs = store.results("town").await.unwrap().runs;
+        let answer = |r: &cullmark::results::RunResult| {
+            let counted = (&r.counters, &r.triangles, &r.draw_calls, &r.nodes_visited);
+            let repeats: Vec<u32> = r.trials.iter().map(|t| t.repeat).collect();
+            format!("{} {:?} {repeats:?} {counted:?} {:?}", r.measurement_id, r.status, r.errors)
+        };
+        runs.iter().map(answer).collect()
+    })
+}
+
+/// `CULLMARK_KILLS` sets how many; the few of every day keep the suite short.
+#[test]
+#[cfg(target_os = "linux")]
+fn kills_at_any_moment_change_nothing_but_the_time() {
+    let kills: u64 = std::env::var("CULLMARK_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(6);
+    let (calm, town) = (Town::new(4), Town::new(4));
+    assert!(calm.run(&[]).status.success());
+    let mut seed = 7u64;
+    for _ in 0..kills {
+        let mut run = town.start(&[]);
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        std::thread::sleep(std::time::Duration::from_millis(5 + (seed >> 33) % 250));
+        run.kill().unwrap();
+        run.wait().unwrap();
+    }
+    let out = town.run(&["--retry-failed"]);
+    assert!(out.status.success(), "{out:?}");
+    assert_eq!(answers(&town), answers(&calm));
 }

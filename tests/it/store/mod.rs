@@ -297,3 +297,52 @@ fn a_synchronous_reader_names_a_missing_database_and_what_to_do() {
     let e = read_results(Path::new("/nowhere/x.db"), "a", Detail::Summary).unwrap_err();
     assert!(e.to_string().contains("/nowhere/x.db") && e.to_string().contains("cullmark run"), "{e}");
 }
+
+#[test]
+fn the_numbers_of_deleted_jobs_are_used_again_without_harm() {
+    let dir = tempfile::tempdir().unwrap();
+    wait(async {
+        let s = study("a", vec![spec("one", 1)], 2);
+        let there = Store::open(&dir.path().join("there.db")).await.unwrap();
+        let id = there.submit(&s).await.unwrap().study_id;
+        finish(&there, id, &s.policy, |_| record(1.0, "h")).await;
+        let file = there.export("a").await.unwrap();
+        // Begun here as well: a trial is under way and another was lost when the finished study comes in.
+        let store = open(dir.path()).await;
+        let id = store.submit(&s).await.unwrap().study_id;
+        let stale = lease(&store, id, Kind::Trial).await;
+        lease(&store, id, Kind::Trial).await;
+        store.import(&file, None).await.unwrap();
+        let next = study("b", vec![spec("two", 9)], 3);
+        let other = store.submit(&next).await.unwrap().study_id;
+        let mut leases = Vec::new();
+        while let Some(l) = store.lease(other, Kind::Trial).await.unwrap() {
+            leases.push(l);
+        }
+        assert_eq!(leases.len(), 3);
+        assert_eq!(store.accept_trial(&stale, &record(9.0, "h"), 1).await.unwrap(), Accepted::Fenced);
+        for l in &leases {
+            assert_eq!(store.accept_trial(l, &record(2.0, "h"), 1).await.unwrap(), Accepted::Yes);
+        }
+        assert_eq!(store.trial_record(&stale.job.target, 0, 0).await.unwrap(), record(1.0, "h"));
+    });
+}
+
+#[test]
+fn another_class_of_machine_is_measured_apart_and_the_first_is_kept() {
+    let dir = tempfile::tempdir().unwrap();
+    wait(async {
+        let store = open(dir.path()).await;
+        let here = study("a", vec![spec("one", 1)], 1);
+        let there = Submission { machine_class: "faster".into(), ..here.clone() };
+        let id = store.submit(&here).await.unwrap().study_id;
+        finish(&store, id, &here.policy, |_| record(5.0, "h")).await;
+        let second = store.submit(&there).await.unwrap();
+        assert_eq!((second.new, second.jobs_added), (1, 1), "the judgement is shared, times are not");
+        finish(&store, id, &there.policy, |_| record(1.0, "h")).await;
+        let r = store.results("a").await.unwrap().runs.remove(0);
+        assert_eq!((r.machine_class.as_str(), r.cull_ns[0]), ("faster", 1.25));
+        assert_eq!(store.submit(&here).await.unwrap().done, 1);
+        assert_eq!(store.results("a").await.unwrap().runs[0].cull_ns[0], 5.25);
+    });
+}
