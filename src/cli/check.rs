@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::manifest::Manifest;
-use crate::matrix::{Matrix, Setting, expand};
+use crate::matrix::{Matrix, expand};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -46,7 +46,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// Manifest and matrix, or every mistake in them.
 pub fn read(path: &Path, sets: &[String]) -> Result<(Manifest, Matrix), Vec<Error>> {
     let manifest = Manifest::load(path, sets)?;
-    let matrix = expand(&manifest, &Setting::default())?;
+    let matrix = expand(&manifest, &super::run::setting(0))?;
     Ok((manifest, matrix))
 }
 

@@ -7,6 +7,7 @@ pub mod exec;
 pub mod export;
 pub mod import;
 pub mod inspect;
+mod known;
 pub mod path;
 pub mod plan;
 pub mod progress;

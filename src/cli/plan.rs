@@ -1,7 +1,12 @@
 //! `cullmark plan`.
 
-use super::check;
-use crate::matrix::plan::{Known, plan};
+use super::run::{series, setting};
+use super::{check, known};
+use crate::error::Error;
+use crate::manifest::Manifest;
+use crate::matrix::plan::{Known, Plan, plan};
+use crate::matrix::{self, Matrix};
+use crate::store::{self, Store};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -12,6 +17,12 @@ pub struct Args {
     /// Lay key=value over the manifest, such as measure.repeats=3 (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Database that tells what is done
+    #[arg(long, value_name = "FILE", default_value = store::DEFAULT_DB)]
+    db: PathBuf,
+    /// Plan for a series measured anew, as `run --series` does
+    #[arg(long, value_name = "next|N")]
+    series: Option<String>,
     /// List every run on a line of its own
     #[arg(long)]
     list: bool,
@@ -21,14 +32,14 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let (manifest, matrix) = match check::read(&args.manifest, &args.set) {
-        Ok(both) => both,
-        Err(errors) => {
-            check::print_errors(&errors, args.json);
-            return Ok(ExitCode::from(2));
-        }
+    let manifest = match Manifest::load(&args.manifest, &args.set) {
+        Ok(manifest) => manifest,
+        Err(errors) => return Ok(mistakes(&errors, args.json)),
     };
-    let plan = plan(&manifest, &matrix, |_| Known::default());
+    let plan = match store::block_on(planned(&args, &manifest))? {
+        Ok(plan) => plan,
+        Err(errors) => return Ok(mistakes(&errors, args.json)),
+    };
     if args.json {
         println!("{}", serde_json::to_string_pretty(&plan)?);
     } else {
@@ -37,4 +48,36 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         print!("{}", plan.summary());
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn mistakes(errors: &[Error], json: bool) -> ExitCode {
+    check::print_errors(errors, json);
+    ExitCode::from(2)
+}
+
+/// Without a database everything is new: planning makes none.
+async fn planned(args: &Args, manifest: &Manifest) -> anyhow::Result<Result<Plan, Vec<Error>>> {
+    let store = if args.db.is_file() { Some(Store::open_existing(&args.db).await?) } else { None };
+    let series = match &store {
+        Some(store) => series(args.series.as_deref(), store, &manifest.study.name).await?,
+        None => 0,
+    };
+    let matrix: Matrix = match matrix::expand(manifest, &setting(series)) {
+        Ok(matrix) => matrix,
+        Err(errors) => return Ok(Err(errors)),
+    };
+    let known = match &store {
+        Some(store) => {
+            let study = format!("{}@{series}", manifest.study.name);
+            known::known(store, &study, &matrix, &manifest.repeat).await?
+        }
+        None => vec![Known::default(); matrix.runs.len()],
+    };
+    if let Some(store) = store {
+        store.close().await;
+    }
+    // `plan` asks for the runs in their order.
+    let next = std::cell::Cell::new(0);
+    let answer = |_: &crate::record::RunSpec| known[next.replace(next.get() + 1)].clone();
+    Ok(Ok(plan(manifest, &matrix, answer)))
 }

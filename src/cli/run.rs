@@ -94,7 +94,7 @@ async fn study(
     let start = Instant::now();
     let auxiliary = worker::auxiliary_workers(args.workers, launcher.cores.len())?;
     let store = Store::open(&args.db).await?;
-    let series = series(args, &store, &manifest.study.name).await?;
+    let series = series(args.series.as_deref(), &store, &manifest.study.name).await?;
     // The lane's core was counted by the launcher, before this process left it.
     let setting = Setting { pin_core: launcher.lane_core, ..setting(series) };
     let matrix = match matrix::expand(manifest, &setting) {
@@ -150,8 +150,9 @@ struct End {
     elapsed: Duration,
 }
 
-async fn series(args: &Args, store: &Store, study: &str) -> anyhow::Result<u32> {
-    Ok(match args.series.as_deref() {
+/// The number that `--series` asks for.
+pub(super) async fn series(asked: Option<&str>, store: &Store, study: &str) -> anyhow::Result<u32> {
+    Ok(match asked {
         None => 0,
         Some("next") => store.next_series(study).await?,
         Some(text) => text.parse().map_err(|_| {

@@ -28,6 +28,8 @@ pub enum State {
     Partial { trials: u32 },
     /// Stored, but something it depends on changed: runs again.
     Rerun { why: String },
+    /// Measured, but other frames or pixels are to be judged now.
+    Rejudge { why: String },
     /// Ended with a failure that is kept: not tried again by itself.
     Failed { why: String },
 }
@@ -40,6 +42,7 @@ impl State {
             State::Done => '=',
             State::Partial { .. } => '~',
             State::Rerun { .. } => '!',
+            State::Rejudge { .. } => '?',
             State::Failed { .. } => 'x',
         }
     }
@@ -55,6 +58,7 @@ pub struct Plan {
     pub done: usize,
     pub partial: usize,
     pub rerun: usize,
+    pub rejudge: usize,
     pub failed: usize,
     /// Trials still to run at the wanted number of repeats.
     pub trials: u64,
@@ -95,6 +99,7 @@ pub fn plan(manifest: &Manifest, matrix: &Matrix, known: impl Fn(&RunSpec) -> Kn
         done: 0,
         partial: 0,
         rerun: 0,
+        rejudge: 0,
         failed: 0,
         trials: 0,
         estimate_s: 0.0,
@@ -105,16 +110,17 @@ pub fn plan(manifest: &Manifest, matrix: &Matrix, known: impl Fn(&RunSpec) -> Kn
         let trials = match &known.state {
             State::New | State::Rerun { .. } => repeats,
             State::Partial { trials } => repeats.saturating_sub(*trials),
-            State::Done | State::Failed { .. } => 0,
+            State::Done | State::Rejudge { .. } | State::Failed { .. } => 0,
         };
         *match known.state {
             State::New => &mut plan.new,
             State::Done => &mut plan.done,
             State::Partial { .. } => &mut plan.partial,
             State::Rerun { .. } => &mut plan.rerun,
+            State::Rejudge { .. } => &mut plan.rejudge,
             State::Failed { .. } => &mut plan.failed,
         } += 1;
-        let judged = matches!(known.state, State::New | State::Rerun { .. });
+        let judged = !matches!(known.state, State::Done | State::Failed { .. });
         plan.guessed += usize::from(trials > 0 && known.trial_s.is_none());
         let one = known.trial_s.unwrap_or_else(|| trial_guess_s(run));
         let estimate_s = one * f64::from(trials) + if judged { judging_guess_s(run) } else { 0.0 };
@@ -226,6 +232,7 @@ impl Plan {
                 (None, State::Done) => "done".into(),
                 (None, State::Partial { trials }) => format!("{trials} trials done"),
                 (None, State::Rerun { why }) => format!("re-run: {why}"),
+                (None, State::Rejudge { why }) => format!("judged again: {why}"),
                 (None, State::Failed { why }) => format!("failed: {why}"),
             };
             let _ = writeln!(out, "{}/{}  {}  {state}", r.scene, r.path, r.cell);
@@ -237,7 +244,12 @@ impl Plan {
     pub fn summary(&self) -> String {
         let mut out = String::new();
         let _ = write!(out, "{} runs: {} new (+), {} done (=)", self.rows.len(), self.new, self.done);
-        for (n, what) in [(self.partial, "begun (~)"), (self.rerun, "to run again (!)"), (self.failed, "failed (x)")] {
+        for (n, what) in [
+            (self.partial, "begun (~)"),
+            (self.rerun, "to run again (!)"),
+            (self.rejudge, "to judge again (?)"),
+            (self.failed, "failed (x)"),
+        ] {
             if n > 0 {
                 let _ = write!(out, ", {n} {what}");
             }
@@ -251,6 +263,18 @@ impl Plan {
             _ => None,
         })) {
             let _ = writeln!(out, "! {n} runs again: {reason}");
+        }
+        for (n, reason) in reasons(self.rows.iter().filter_map(|r| match &r.known.state {
+            State::Rejudge { why } => Some(why.as_str()),
+            _ => None,
+        })) {
+            let _ = writeln!(out, "? {n} judged again: {reason}");
+        }
+        for (n, reason) in reasons(self.rows.iter().filter_map(|r| match &r.known.state {
+            State::Failed { why } => Some(why.as_str()),
+            _ => None,
+        })) {
+            let _ = writeln!(out, "x {n} failed: {reason}");
         }
         for (n, reason) in reasons(self.excluded.iter().filter_map(|r| r.excluded.as_deref())) {
             let _ = writeln!(out, "- {n} excluded: {reason}");
