@@ -9,20 +9,18 @@ use super::labels::Grid;
 use super::metrics::{frames, known};
 use super::rows::{self, Datum, Rows};
 use super::scatter::{self, Scatter};
-use super::style::Legend;
+use super::style::IDLE;
 use crate::results::RunResult;
 
 pub fn all(grid: &Grid, judged: &[Judged]) -> Vec<Figure> {
     if grid.results.runs.is_empty() {
         return Vec::new();
     }
-    let legend = Legend::of(grid.results);
-    let mut figures = vec![total_time(grid, &legend), total_model(grid, &legend)];
-    figures.extend([time_per_frame(grid, &legend), triangles_per_frame(grid, &legend)]);
+    let mut figures = vec![total_model(grid), total_time(grid), time_per_frame(grid), triangles_per_frame(grid)];
     if grid.runs().any(|r| !r.errors.is_empty()) {
-        figures.extend(errors(grid, &legend));
+        figures.extend(errors(grid));
     }
-    figures.extend([memory(grid, &legend), build(grid, &legend)]);
+    figures.extend([memory(grid), build(grid)]);
     figures.extend(forest::draw(judged));
     figures
 }
@@ -53,36 +51,56 @@ fn dot(metric: &'static str) -> impl Fn(&RunResult) -> Option<Datum> {
 
 const WHISKERS: &str = "Dots: median over repeats; whiskers: its 95 % bootstrap interval.";
 
-fn total_time(grid: &Grid, legend: &Legend) -> Figure {
+/// Explains the daggers, where there are any.
+fn dagger(grid: &Grid) -> &'static str {
+    if grid.runs().any(rows::may_lose) {
+        " †: aggressive or approximate, it may lose visible triangles; beside it the pixels that lost theirs, per million."
+    } else {
+        ""
+    }
+}
+
+/// Who is left out of charts of measured culling time.
+fn without_idle(grid: &Grid) -> &'static str {
+    if grid.runs().any(|r| r.culling == IDLE) { " “none” does no culling and is left out." } else { "" }
+}
+
+fn total_time(grid: &Grid) -> Figure {
     let figure = rows::draw(
         grid,
-        legend,
         &Rows {
             id: "total-time",
             title: "Total culling time over the walkthrough",
             sub: "Measured processor time of culling alone; less is better.",
             axis: "culling time (ms)",
             linear: false,
+            errors: true,
             datum: &dot("total_cull_ms"),
         },
     );
-    with_caption(figure, format!("Total measured culling time per combination and scene; {}. {WHISKERS}", basis(grid)))
+    with_caption(
+        figure,
+        format!("Total measured culling time per combination and scene; {}. {WHISKERS}{}", basis(grid), dagger(grid)),
+    )
 }
 
-fn total_model(grid: &Grid, legend: &Legend) -> Figure {
+fn total_model(grid: &Grid) -> Figure {
     let figure = rows::draw(
         grid,
-        legend,
         &Rows {
             id: "total-time-modelled",
             title: "Total frame time over the walkthrough (modelled)",
             sub: "Modelled, not measured: culling + cost of submitted indices + cost of draw calls.",
             axis: "modelled frame time, total (ms)",
             linear: false,
+            errors: true,
             datum: &dot("total_frame_ms_model"),
         },
     );
-    with_caption(figure, format!("Modelled total frame time; {}. {} {WHISKERS}", basis(grid), model_words(grid)))
+    with_caption(
+        figure,
+        format!("Modelled total frame time; {}. {} {WHISKERS}{}", basis(grid), model_words(grid), dagger(grid)),
+    )
 }
 
 /// The formula with the constants of the study.
@@ -95,39 +113,40 @@ pub fn model_words(grid: &Grid) -> String {
     )
 }
 
-fn time_per_frame(grid: &Grid, legend: &Legend) -> Figure {
+fn time_per_frame(grid: &Grid) -> Figure {
     let every = grid.results.consolidate_frames.max(1);
     let figure = curves::draw(
         grid,
-        legend,
         &Curves {
             id: "time-per-frame",
             title: "Culling time per frame",
             sub: "Measured; band: smallest to largest of the repeats.",
             axis: "culling time (µs)",
+            working_only: true,
             series: &|r| r.trial_cull_ns.iter().map(|t| t.iter().map(|ns| ns / 1e3).collect()).collect(),
         },
     );
     with_caption(
         figure,
         format!(
-            "Measured culling time per frame; {}. Each point is the mean of {}; line: median over repeats, band: smallest to largest.",
+            "Measured culling time per frame; {}. Each point is the mean of {}; line: median over repeats, band: smallest to largest.{}",
             basis(grid),
-            count(every.into(), "frame", "frames")
+            count(every.into(), "frame", "frames"),
+            without_idle(grid)
         ),
     )
 }
 
-fn triangles_per_frame(grid: &Grid, legend: &Legend) -> Figure {
+fn triangles_per_frame(grid: &Grid) -> Figure {
     let every = grid.results.consolidate_frames.max(1);
     let figure = curves::draw(
         grid,
-        legend,
         &Curves {
             id: "triangles-per-frame",
             title: "Triangles submitted per frame",
             sub: "Counted; identical in every repeat, so there is no band.",
             axis: "triangles",
+            working_only: false,
             series: &|r| if r.triangles.is_empty() { vec![] } else { vec![r.triangles.clone()] },
         },
     );
@@ -141,29 +160,14 @@ fn triangles_per_frame(grid: &Grid, legend: &Legend) -> Figure {
     )
 }
 
-fn errors(grid: &Grid, legend: &Legend) -> Vec<Figure> {
+fn errors(grid: &Grid) -> Vec<Figure> {
     let judged = grid.runs().map(|r| r.errors.len()).max().unwrap_or(0);
     let samples = format!("Errors at {} of each path.", count(judged as u64, "judged frame", "judged frames"));
-    let front = "Dashed: Pareto front; what it dominates is faded.";
+    let front = format!("Dashed: Pareto front, its points named; what it dominates is faded.{}", dagger(grid));
     let pair = |x: &'static str, y: &'static str| move |r: &RunResult| Some((known(x).value(r)?, known(y).value(r)?));
-    let measured = pair("median_frame_us", "false_cull_ppm");
-    let chart = |what: Scatter, caption: String| with_caption(scatter::draw(grid, legend, &what), caption);
+    let working = |x, y| move |r: &RunResult| if r.culling == IDLE { None } else { pair(x, y)(r) };
+    let chart = |what: Scatter, caption: String| with_caption(scatter::draw(grid, &what), caption);
     vec![
-        chart(
-            Scatter {
-                id: "time-against-error",
-                title: "Culling time against false culls",
-                sub: "Lower left is better. Combinations that cull nothing are left out: they would win by doing nothing.",
-                x_axis: "culling time of the median frame (µs)",
-                y_axis: "false-cull pixels per million",
-                zero_bin: true,
-                point: &|r| if r.culling == "none" { None } else { measured(r) },
-            },
-            format!(
-                "Measured culling time of the median frame against pixels that lost their triangle; {}. {samples} {front} The shaded bin holds exact zeros.",
-                basis(grid)
-            ),
-        ),
         chart(
             Scatter {
                 id: "time-against-error-modelled",
@@ -175,9 +179,25 @@ fn errors(grid: &Grid, legend: &Legend) -> Vec<Figure> {
                 point: &pair("frame_ms_model", "false_cull_ppm"),
             },
             format!(
-                "Modelled frame time against pixels that lost their triangle; {}. {} {samples} {front}",
+                "Modelled frame time against pixels that lost their triangle; {}. {} {samples} {front} The shaded bin holds exact zeros.",
                 basis(grid),
                 model_words(grid)
+            ),
+        ),
+        chart(
+            Scatter {
+                id: "time-against-error",
+                title: "Culling time against false culls",
+                sub: "Culling alone: drawing what was not culled is not in it. Lower left is better.",
+                x_axis: "culling time of the median frame (µs)",
+                y_axis: "false-cull pixels per million",
+                zero_bin: true,
+                point: &working("median_frame_us", "false_cull_ppm"),
+            },
+            format!(
+                "Measured culling time of the median frame against pixels that lost their triangle; {}. {samples} {front}{} The shaded bin holds exact zeros.",
+                basis(grid),
+                without_idle(grid)
             ),
         ),
         chart(
@@ -188,26 +208,27 @@ fn errors(grid: &Grid, legend: &Legend) -> Vec<Figure> {
                 x_axis: "culling time of the median frame (µs)",
                 y_axis: "submitted / visible triangles",
                 zero_bin: false,
-                point: &pair("median_frame_us", "over_submission"),
+                point: &working("median_frame_us", "over_submission"),
             },
             format!(
-                "Measured culling time of the median frame against over-submission; {}. {samples} {front}",
-                basis(grid)
+                "Measured culling time of the median frame against over-submission; {}. {samples} {front}{}",
+                basis(grid),
+                without_idle(grid)
             ),
         ),
     ]
 }
 
-fn memory(grid: &Grid, legend: &Legend) -> Figure {
+fn memory(grid: &Grid) -> Figure {
     let figure = rows::draw(
         grid,
-        legend,
         &Rows {
             id: "memory",
             title: "Memory of structure and tests",
             sub: "Counted bytes; full: the structure, pale: the per-node columns of the tests.",
             axis: "memory (MiB)",
             linear: true,
+            errors: false,
             datum: &|r| {
                 let all = known("structure_mib").value(r)?;
                 let tests = known("test_mib").value(r).unwrap_or(0.0);
@@ -223,16 +244,16 @@ fn memory(grid: &Grid, legend: &Legend) -> Figure {
     )
 }
 
-fn build(grid: &Grid, legend: &Legend) -> Figure {
+fn build(grid: &Grid) -> Figure {
     let figure = rows::draw(
         grid,
-        legend,
         &Rows {
             id: "build-time",
             title: "Building time",
             sub: "Measured; full: the structure with flattening, pale: preparing the tests. Medians over repeats.",
             axis: "time to build (ms)",
             linear: true,
+            errors: false,
             datum: &|r| {
                 let build = known("build_ms").value(r)?;
                 let prepare = known("prepare_ms").value(r).unwrap_or(0.0);

@@ -1,13 +1,16 @@
-//! Charts over the frames of a path: one panel a scene, one line a combination.
+//! Charts over the frames of a path. When colour means culling, one panel for
+//! every scene (row) and structure (column), with one y axis a row, so that a
+//! panel holds a handful of lines; else one panel a scene with all lines.
 
 use super::consolidate::{BandPoint, band};
-use super::facets::{self, Sample};
-use super::figure::{Figure, Mark, Part};
+use super::facets::{self, BODY, HEAD, SMALL, Sample};
+use super::figure::{Figure, Mark, Part, Rect, plain, text_box};
+use super::font;
 use super::labels::Grid;
 use super::metrics::frames;
 use super::rows::absence;
 use super::scale::Scale;
-use super::style::Legend;
+use super::style::{IDLE, INK, MUTED};
 use crate::results::{RunResult, RunStatus};
 
 pub struct Curves<'a> {
@@ -16,92 +19,194 @@ pub struct Curves<'a> {
     pub sub: &'a str,
     /// Quantity and unit.
     pub axis: &'a str,
+    /// Leave out whoever culls nothing.
+    pub working_only: bool,
     /// Per trial, frame by frame, in the unit of the axis; empty has no line.
     pub series: &'a dyn Fn(&RunResult) -> Vec<Vec<f64>>,
 }
 
-pub fn draw(grid: &Grid, legend: &Legend, what: &Curves) -> Figure {
+/// More columns than this are too narrow to read.
+const MOST_COLUMNS: usize = 5;
+/// Of the whole figure.
+const WIDTH: f64 = 1040.0;
+const LEFT: f64 = 74.0;
+
+type Line = Vec<BandPoint>;
+
+/// One set of axes: a scene, and the combinations it shows.
+struct Panel {
+    place: usize,
+    /// Over the plot: the structure, or the scene.
+    head: String,
+    shown: Vec<usize>,
+    plot: Rect,
+}
+
+/// Where panels lie and what is written around them.
+struct Layout {
+    panels: Vec<Panel>,
+    columns: usize,
+    /// Columns are structures: lines are solid, scenes head rows.
+    by_structure: bool,
+    height: f64,
+    legend: Sample,
+}
+
+pub fn draw(grid: &Grid, what: &Curves) -> Figure {
     let every = grid.results.consolidate_frames;
-    let curves: Vec<Vec<Vec<BandPoint>>> = grid
-        .cells
-        .iter()
-        .map(|row| {
-            let usable = |cell: &Option<&RunResult>| cell.filter(|r| r.status == RunStatus::Done).map(what.series);
-            row.iter().map(|cell| usable(cell).map_or_else(Vec::new, |trials| band(&trials, every))).collect()
-        })
-        .collect();
+    let drawn = |r: &&RunResult| r.status == RunStatus::Done && !(what.working_only && r.culling == IDLE);
+    let line =
+        |cell: &Option<&RunResult>| cell.filter(drawn).map(what.series).map_or_else(Vec::new, |t| band(&t, every));
+    let curves: Vec<Vec<Line>> = grid.cells.iter().map(|row| row.iter().map(line).collect()).collect();
 
-    let columns = grid.places.len().clamp(1, 2);
-    let rows = grid.places.len().div_ceil(columns);
-    let (w, h) = if columns == 1 { (840.0, 300.0) } else { (404.0, 190.0) };
-    let (left, gap) = (74.0, (84.0, 76.0));
-    let width = left + columns as f64 * w + (columns as f64 - 1.0) * gap.0 + 28.0;
-    let legend_h = facets::legend_height(legend, width - 32.0);
-    let top = 58.0 + legend_h + 26.0;
-    let height = top + rows as f64 * h + (rows as f64 - 1.0) * gap.1 + 46.0;
-    let mut figure = Figure::new(what.id, what.title, width, height);
+    let layout = layout(grid);
+    let mut figure = Figure::new(what.id, what.title, WIDTH, layout.height);
     facets::title(&mut figure, what.title, what.sub);
-    facets::legend(&mut figure, legend, 16.0, 58.0, width - 32.0, Sample::Line);
-
-    for (i, plot) in facets::panels(grid.places.len(), columns, left, top, (w, h), gap).into_iter().enumerate() {
-        figure.part(Part::Plot, plot);
-        let points = || curves[i].iter().flatten();
-        let values: Vec<f64> = points().flat_map(|p| [p.low, p.high]).collect();
-        let y = y_scale(grid, i, &curves[i], &values).onto(plot.bottom(), plot.y);
-        let last = grid.cells[i].iter().flatten().map(|r| frames(r)).max().unwrap_or(1);
-        let x = Scale { high: last.max(1) as f64, ..Scale::from_zero([1.0]) }.onto(plot.x, plot.right());
-        facets::panel_head(&mut figure, plot, &grid.places[i], &missing(grid, i));
-        facets::y_axis(&mut figure, plot, &y, 5);
-        facets::x_axis(&mut figure, plot, &x, 6, true);
-        facets::x_title(&mut figure, plot, "frame");
-        facets::y_title(&mut figure, plot, what.axis, 50.0);
-        for (c, curve) in curves[i].iter().enumerate() {
-            let colour = legend.look(&grid.combinations[c]).colour;
-            let upper = curve.iter().map(|p| (x.at(p.frame), y.at(p.high)));
-            let lower = curve.iter().rev().map(|p| (x.at(p.frame), y.at(p.low)));
-            if curve.iter().any(|p| p.high > p.low) {
-                figure.marks.push(Mark::Polygon { points: upper.chain(lower).collect(), colour, alpha: 0.18 });
-            }
+    facets::legend(&mut figure, &grid.legend, 16.0, 58.0, WIDTH - 32.0, layout.legend);
+    let rows = layout.panels.len().div_ceil(layout.columns);
+    for (i, panel) in layout.panels.iter().enumerate() {
+        let (row, column) = (i / layout.columns, i % layout.columns);
+        if layout.by_structure && column == 0 {
+            row_head(&mut figure, grid, panel);
         }
-        for (c, curve) in curves[i].iter().enumerate() {
-            let look = legend.look(&grid.combinations[c]);
-            let line: Vec<(f64, f64)> = curve.iter().map(|p| (x.at(p.frame), y.at(p.middle))).collect();
-            figure.dashed(&line, look.colour, 1.5, 1.0, look.dash);
-            if line.len() == 1 {
-                figure.marker(line[0].0, line[0].1, 3.0, look.shape, look.colour, 1.0);
-            }
-        }
+        let lowest = !layout.by_structure || row + 1 == rows;
+        draw_panel(&mut figure, grid, what, &layout, panel, &curves[panel.place], (column == 0, lowest));
     }
     figure.description = describe(grid, &curves, what);
     figure
 }
 
-/// Linear from zero unless the combinations that cull range widely: those that
-/// cull nothing cost next to nothing and must not squeeze all others.
-fn y_scale(grid: &Grid, place: usize, curves: &[Vec<BandPoint>], all: &[f64]) -> Scale {
-    let culls = |c: &usize| grid.cells[place][*c].is_some_and(|r| r.culling != "none");
-    let working: Vec<f64> = (0..curves.len()).filter(culls).flat_map(|c| curves[c].iter().map(|p| p.middle)).collect();
-    if Scale::fitting(&working).is_log() { Scale::fitting(all) } else { Scale::from_zero(all.iter().copied()) }
+fn layout(grid: &Grid) -> Layout {
+    let legend = &grid.legend;
+    let by_structure = legend.systematic && legend.variants.len() <= MOST_COLUMNS;
+    let sample = if by_structure { Sample::CullingLine } else { Sample::Line };
+    let top = 58.0 + facets::legend_height(legend, WIDTH - 32.0, sample);
+    let of_variant = |v: usize| (0..grid.combinations.len()).filter(move |c| grid.variant_of[*c] == v).collect();
+    if !by_structure {
+        let columns = grid.places.len().clamp(1, 2);
+        let (h, gap) = if columns == 1 { (300.0, 0.0) } else { (190.0, 84.0) };
+        let w = (WIDTH - LEFT - 28.0 - gap * (columns as f64 - 1.0)) / columns as f64;
+        let plots = facets::panels(grid.places.len(), columns, LEFT, top + 26.0, (w, h), (gap, 76.0));
+        let height = plots.last().map_or(top, Rect::bottom) + 46.0;
+        let panels = plots.into_iter().enumerate().map(|(place, plot)| Panel {
+            place,
+            head: grid.places[place].clone(),
+            shown: (0..grid.combinations.len()).collect(),
+            plot,
+        });
+        return Layout { panels: panels.collect(), columns, by_structure, height, legend: sample };
+    }
+    let columns = legend.variants.len().max(1);
+    let gap = 14.0;
+    let w = (WIDTH - LEFT - 28.0 - gap * (columns as f64 - 1.0)) / columns as f64;
+    let h = if grid.places.len() <= 2 { 210.0 } else { 128.0 };
+    // Above a row: the scene, then the structures.
+    let plots = facets::panels(grid.places.len() * columns, columns, LEFT, top + 46.0, (w, h), (gap, 70.0));
+    let height = plots.last().map_or(top, Rect::bottom) + 46.0;
+    let panels = plots.into_iter().enumerate().map(|(i, plot)| Panel {
+        place: i / columns,
+        head: legend.variants[i % columns].clone(),
+        shown: of_variant(i % columns),
+        plot,
+    });
+    Layout { panels: panels.collect(), columns, by_structure, height, legend: sample }
 }
 
-/// "2 failed, 1 wrong" for the combinations without a line.
-fn missing(grid: &Grid, place: usize) -> String {
-    let mut counts: Vec<(&str, usize)> = Vec::new();
-    for cell in &grid.cells[place] {
-        if cell.is_some_and(|r| r.status == RunStatus::Done) {
-            continue;
-        }
-        let words = absence(*cell).0;
-        match counts.iter_mut().find(|(w, _)| *w == words) {
-            Some((_, n)) => *n += 1,
-            None => counts.push((words, 1)),
+/// The scene, and what is missing of it.
+fn row_head(figure: &mut Figure, grid: &Grid, panel: &Panel) {
+    let y = panel.plot.y - 26.0;
+    let r = figure.label(16.0, y, &grid.places[panel.place], plain(HEAD, INK).bold());
+    let mut note = missing(grid, panel.place);
+    let style = plain(SMALL, MUTED);
+    while r.right() + 12.0 + font::width(&note, SMALL, false) > WIDTH - 20.0 {
+        // A long list is cut after a whole part; tables name everything.
+        match note.trim_end_matches(", …").rsplit_once(", ") {
+            Some((kept, _)) => note = format!("{kept}, …"),
+            None => return,
         }
     }
-    let parts: Vec<String> = counts.iter().map(|(w, n)| format!("{n} {w}")).collect();
-    parts.join(", ")
+    if !note.is_empty() {
+        figure.label(r.right() + 12.0, y, &note, style);
+    }
 }
 
-fn describe(grid: &Grid, curves: &[Vec<Vec<BandPoint>>], what: &Curves) -> String {
+fn draw_panel(
+    figure: &mut Figure,
+    grid: &Grid,
+    what: &Curves,
+    layout: &Layout,
+    panel: &Panel,
+    curves: &[Line],
+    (leftmost, lowest): (bool, bool),
+) {
+    let plot = panel.plot;
+    figure.part(Part::Plot, plot);
+    // One y axis for all structures of a scene.
+    let y = y_scale(grid, panel.place, curves).onto(plot.bottom(), plot.y);
+    let last = grid.cells[panel.place].iter().flatten().map(|r| frames(r)).max().unwrap_or(1);
+    let x = Scale { high: last.max(1) as f64, ..Scale::from_zero([1.0]) }.onto(plot.x, plot.right());
+    if layout.by_structure {
+        figure.label(plot.x, plot.y - 7.0, &panel.head, plain(BODY, MUTED));
+    } else {
+        facets::panel_head(figure, plot, &panel.head, &missing(grid, panel.place));
+    }
+    if leftmost || !layout.by_structure {
+        facets::y_axis(figure, plot, &y, 5);
+        facets::y_title(figure, plot, what.axis, 50.0);
+    } else {
+        facets::y_grid(figure, plot, &y, 5);
+    }
+    // The label at the right end would run into that of the next panel's zero.
+    facets::x_axis(figure, plot, &x, (plot.w / 60.0) as usize, true);
+    if lowest {
+        facets::x_title(figure, plot, "frame");
+    }
+    for c in &panel.shown {
+        let colour = grid.legend.entries[*c].look.colour;
+        let upper = curves[*c].iter().map(|p| (x.at(p.frame), y.at(p.high)));
+        let lower = curves[*c].iter().rev().map(|p| (x.at(p.frame), y.at(p.low)));
+        if curves[*c].iter().any(|p| p.high > p.low) {
+            figure.marks.push(Mark::Polygon { points: upper.chain(lower).collect(), colour, alpha: 0.18 });
+        }
+    }
+    for c in &panel.shown {
+        let look = grid.legend.entries[*c].look;
+        let line: Vec<(f64, f64)> = curves[*c].iter().map(|p| (x.at(p.frame), y.at(p.middle))).collect();
+        figure.dashed(&line, look.colour, 1.5, 1.0, if layout.by_structure { &[] } else { look.dash });
+        if line.len() == 1 {
+            figure.marker(line[0].0, line[0].1, 3.0, look.shape, look.colour, 1.0);
+        }
+    }
+    if panel.shown.iter().all(|c| curves[*c].is_empty()) {
+        let absent = panel.shown.iter().all(|c| grid.cells[panel.place][*c].is_none());
+        let words = if absent { "not in the matrix" } else { "no usable run" };
+        let style = plain(SMALL, MUTED).middle();
+        let (tx, ty) = (plot.x + plot.w / 2.0, plot.y + plot.h / 2.0);
+        figure.rect(text_box(tx, ty, words, style), super::style::PAPER, 1.0);
+        figure.label(tx, ty, words, style);
+    }
+}
+
+/// Linear from zero unless the combinations that cull range widely: those that
+/// cull nothing cost next to nothing and must not squeeze all others.
+fn y_scale(grid: &Grid, place: usize, curves: &[Line]) -> Scale {
+    let all: Vec<f64> = curves.iter().flatten().flat_map(|p| [p.low, p.high]).collect();
+    let culls = |c: &usize| grid.cells[place][*c].is_some_and(|r| r.culling != IDLE);
+    let working: Vec<f64> = (0..curves.len()).filter(culls).flat_map(|c| curves[c].iter().map(|p| p.middle)).collect();
+    if Scale::fitting(&working).is_log() { Scale::fitting(&all) } else { Scale::from_zero(all) }
+}
+
+/// "octree × frustum failed, ...": runs of the matrix that have no line, with the reason in a word.
+fn missing(grid: &Grid, place: usize) -> String {
+    let cells = grid.combinations.iter().zip(&grid.cells[place]);
+    let gaps: Vec<String> = cells
+        .filter(|(_, cell)| cell.is_some_and(|r| r.status != RunStatus::Done))
+        .map(|(label, cell)| format!("{label} {}", absence(*cell).0))
+        .collect();
+    gaps.join(", ")
+}
+
+fn describe(grid: &Grid, curves: &[Vec<Line>], what: &Curves) -> String {
     let mut out = format!("{}. {}, against frame. ", what.title, what.axis);
     for (place, row) in grid.places.iter().zip(curves) {
         let parts: Vec<String> = grid

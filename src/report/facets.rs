@@ -3,7 +3,7 @@
 use super::figure::{Figure, Part, Rect, plain, text_box};
 use super::font;
 use super::scale::Scale;
-use super::style::{FRAME, GRID, INK, Legend, MUTED};
+use super::style::{Colour, FRAME, GRID, INK, Legend, Look, MUTED};
 
 /// Em sizes.
 pub const TITLE: f64 = 15.0;
@@ -43,45 +43,88 @@ pub fn title(figure: &mut Figure, text: &str, sub: &str) -> f64 {
 pub enum Sample {
     Line,
     Marker,
+    /// Solid lines by culling alone: the structure is said elsewhere.
+    CullingLine,
 }
 
-/// Height of the legend for a width.
-pub fn legend_height(legend: &Legend, width: f64) -> f64 {
-    legend_rows(legend, width).len() as f64 * 18.0 + 8.0
+enum Item<'a> {
+    /// What the next samples mean.
+    Group(&'static str),
+    Look(&'a str, Look),
+    /// A patch: the colour without a shape.
+    Patch(&'a str, Colour),
 }
 
-fn legend_rows(legend: &Legend, width: f64) -> Vec<Vec<usize>> {
-    let mut rows: Vec<Vec<usize>> = vec![Vec::new()];
-    let mut x = 0.0;
-    for (i, (label, _)) in legend.entries.iter().enumerate() {
-        let w = 34.0 + font::width(label, BODY, false) + 18.0;
-        if x + w > width && x > 0.0 {
-            rows.push(Vec::new());
-            x = 0.0;
+impl Item<'_> {
+    fn width(&self) -> f64 {
+        match self {
+            Item::Group(text) => font::width(text, SMALL, false) + 10.0,
+            Item::Look(text, _) => 34.0 + font::width(text, BODY, false) + 18.0,
+            Item::Patch(text, _) => 18.0 + font::width(text, BODY, false) + 18.0,
         }
-        x += w;
-        rows.last_mut().expect("at least one row").push(i);
+    }
+}
+
+/// Rows of the legend: one group a row, wrapped where it must be.
+fn legend_rows(legend: &Legend, width: f64, sample: Sample) -> Vec<Vec<Item<'_>>> {
+    let mut groups: Vec<Vec<Item>> = Vec::new();
+    if legend.systematic {
+        let colours = legend.cullings.iter().map(|c| Item::Patch(c, legend.culling_colour(c)));
+        groups.push(std::iter::once(Item::Group("colour: culling")).chain(colours).collect());
+        if sample != Sample::CullingLine {
+            let head = if sample == Sample::Line { "line: structure" } else { "marker: structure" };
+            let looks = legend.variants.iter().enumerate().map(|(i, v)| Item::Look(v, legend.variant_look(i)));
+            groups.push(std::iter::once(Item::Group(head)).chain(looks).collect());
+        }
+    } else {
+        groups.push(legend.entries.iter().map(|e| Item::Look(&e.label, e.look)).collect());
+    }
+    let mut rows = Vec::new();
+    for group in groups {
+        let mut x = 0.0;
+        rows.push(Vec::new());
+        for item in group {
+            if x + item.width() > width && x > 0.0 {
+                rows.push(Vec::new());
+                x = 0.0;
+            }
+            x += item.width();
+            rows.last_mut().expect("at least one row").push(item);
+        }
     }
     rows
 }
 
+/// Height of the legend for a width.
+pub fn legend_height(legend: &Legend, width: f64, sample: Sample) -> f64 {
+    legend_rows(legend, width, sample).len() as f64 * 18.0 + 8.0
+}
+
 /// Draws the legend in rows from (`x`, `y`) downward, outside every plot.
 pub fn legend(figure: &mut Figure, legend: &Legend, x: f64, y: f64, width: f64, sample: Sample) {
-    for (r, row) in legend_rows(legend, width).iter().enumerate() {
+    for (r, row) in legend_rows(legend, width, sample).iter().enumerate() {
         let (mut at, base) = (x, y + 14.0 + 18.0 * r as f64);
-        for i in row {
-            let (label, look) = &legend.entries[*i];
+        for item in row {
             let middle = base - 4.0;
-            if sample == Sample::Line {
-                figure.dashed(&[(at, middle), (at + 26.0, middle)], look.colour, 2.0, 1.0, look.dash);
-            } else {
-                figure.marker(at + 13.0, middle, 4.5, look.shape, look.colour, 1.0);
+            match item {
+                Item::Group(text) => drop(figure.label(at, base, text, plain(SMALL, MUTED))),
+                Item::Patch(text, colour) => {
+                    figure.rect(Rect::new(at, middle - 5.0, 12.0, 10.0), *colour, 1.0);
+                    figure.label(at + 18.0, base, text, plain(BODY, INK));
+                }
+                Item::Look(text, look) => {
+                    if sample == Sample::Marker {
+                        figure.marker(at + 13.0, middle, 4.5, look.shape, look.colour, 1.0);
+                    } else {
+                        figure.dashed(&[(at, middle), (at + 26.0, middle)], look.colour, 2.0, 1.0, look.dash);
+                    }
+                    figure.label(at + 34.0, base, text, plain(BODY, INK));
+                }
             }
-            let r = figure.label(at + 34.0, base, label, plain(BODY, INK));
-            at = r.right() + 18.0;
+            at += item.width();
         }
     }
-    let height = legend_height(legend, width);
+    let height = legend_height(legend, width, sample);
     figure.part(Part::Legend, Rect::new(x, y, width, height));
 }
 
@@ -120,14 +163,21 @@ pub fn x_axis(figure: &mut Figure, plot: Rect, scale: &Scale, wanted: usize, lab
 
 /// Horizontal grid lines and labels at the left: a y axis.
 pub fn y_axis(figure: &mut Figure, plot: Rect, scale: &Scale, wanted: usize) {
+    y_grid(figure, plot, scale, wanted);
+    for tick in scale.ticks(wanted).iter().filter(|t| !t.label.is_empty()) {
+        figure.label(plot.x - 7.0, scale.at(tick.at) + 3.6, &tick.label, plain(SMALL, MUTED).end());
+    }
+}
+
+/// A y axis that shares the labels of the panel to its left.
+pub fn y_grid(figure: &mut Figure, plot: Rect, scale: &Scale, wanted: usize) {
     for tick in scale.ticks(wanted) {
         let y = scale.at(tick.at);
         if tick.label.is_empty() {
             figure.segment((plot.x, y), (plot.x + 3.0, y), FRAME, 0.8);
-            continue;
+        } else {
+            figure.segment((plot.x, y), (plot.right(), y), GRID, 1.0);
         }
-        figure.segment((plot.x, y), (plot.right(), y), GRID, 1.0);
-        figure.label(plot.x - 7.0, y + 3.6, &tick.label, plain(SMALL, MUTED).end());
     }
     figure.segment((plot.x, plot.y), (plot.x, plot.bottom()), FRAME, 1.0);
 }

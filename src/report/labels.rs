@@ -1,31 +1,60 @@
 //! Labels of combinations and scenes: as short as they can be and still differ.
 
+use super::style::{Legend, Look};
 use crate::results::{RunResult, StudyResults};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-/// `octree × frustum`; with walk, path, machine class or series only when the
-/// study varies them.
-pub fn combination(results: &StudyResults, run: &RunResult) -> String {
-    let mut label = run.label();
-    if varies(results, |r| r.walk.clone()) {
-        label += &format!(" × {}", run.walk);
-    }
-    for axis in results.runs.iter().flat_map(|r| r.spec.axes.keys()).collect::<BTreeSet<_>>() {
-        if let Some(part) = run.spec.axes.get(axis) {
-            label += &format!(" × {part}");
-        }
-    }
-    if varies(results, |r| r.machine_class.clone()) {
-        label += &format!(" on {}", run.machine_class);
-    }
-    if varies(results, |r| r.spec.series.to_string()) {
-        label += &format!(" (series {})", run.spec.series);
-    }
-    label
+/// Labels of one run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Names {
+    /// The scene; with its path when a scene is walked by several.
+    pub place: String,
+    /// `octree:depth=4`, and whatever else but the culling sets a combination
+    /// apart: walk, further axes, machine class, series.
+    pub variant: String,
+    pub culling: String,
+    /// `octree:depth=4 × frustum`: structure, culling, then the rest.
+    pub combination: String,
 }
 
-/// The scene; with its path when a scene is walked by several, and with the
-/// camera's number when a study has several cameras.
+/// Names of all runs, in their order. A walk is named only where runs of the
+/// same structure differ in it; a machine class or series only when they vary.
+fn names(results: &StudyResults) -> Vec<Names> {
+    let mut walks: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    let mut paths: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for run in &results.runs {
+        walks.entry(&run.structure).or_default().insert(&run.walk);
+        paths.entry(run.scene()).or_default().insert(&run.spec.path.name);
+    }
+    let machines: BTreeSet<&str> = results.runs.iter().map(|r| r.machine_class.as_str()).collect();
+    let series: BTreeSet<String> = results.runs.iter().map(|r| r.spec.series.to_string()).collect();
+    let name = |run: &RunResult| {
+        let mut rest = String::new();
+        if walks[run.structure.as_str()].len() > 1 {
+            rest += &format!(" × {}", run.walk);
+        }
+        for part in run.spec.axes.values() {
+            rest += &format!(" × {part}");
+        }
+        if machines.len() > 1 {
+            rest += &format!(" on {}", run.machine_class);
+        }
+        if series.len() > 1 {
+            rest += &format!(" (series {})", run.spec.series);
+        }
+        let scene = run.scene();
+        let place = if paths[scene].len() > 1 { format!("{scene} / {}", run.spec.path.name) } else { scene.into() };
+        Names {
+            place,
+            variant: format!("{}{rest}", run.structure),
+            culling: run.culling.clone(),
+            combination: format!("{}{rest}", run.label()),
+        }
+    };
+    results.runs.iter().map(name).collect()
+}
+
+/// The scene; with its path when a scene is walked by several.
 pub fn place(results: &StudyResults, run: &RunResult) -> String {
     let several = |other: &RunResult| other.scene() == run.scene() && other.spec.path.name != run.spec.path.name;
     if results.runs.iter().any(several) {
@@ -35,49 +64,54 @@ pub fn place(results: &StudyResults, run: &RunResult) -> String {
     }
 }
 
-/// Places in the order of the matrix.
-pub fn places(results: &StudyResults) -> Vec<String> {
-    let mut places = Vec::new();
-    for run in &results.runs {
-        let place = place(results, run);
-        if !places.contains(&place) {
-            places.push(place);
-        }
-    }
-    places
-}
-
-fn varies(results: &StudyResults, of: impl Fn(&RunResult) -> String) -> bool {
-    let first = results.runs.first().map(&of);
-    results.runs.iter().any(|r| Some(of(r)) != first)
-}
-
 /// A run of every cell of places x combinations: `None` where the matrix has none.
 pub struct Grid<'a> {
     pub results: &'a StudyResults,
+    pub legend: Legend,
+    /// In the order of the matrix.
     pub places: Vec<String>,
     pub combinations: Vec<String>,
+    /// Of each combination: its index in `legend.variants`.
+    pub variant_of: Vec<usize>,
     /// `cells[place][combination]`.
     pub cells: Vec<Vec<Option<&'a RunResult>>>,
+    /// Of each run, in the order of the results.
+    pub names: Vec<Names>,
 }
 
 impl<'a> Grid<'a> {
     pub fn of(results: &'a StudyResults) -> Grid<'a> {
-        let places = places(results);
-        let legend = super::style::Legend::of(results);
-        let combinations: Vec<String> = legend.entries.iter().map(|(l, _)| l.clone()).collect();
+        let names = names(results);
+        let legend = Legend::of(&names);
+        let mut places: Vec<String> = Vec::new();
+        for n in &names {
+            if !places.contains(&n.place) {
+                places.push(n.place.clone());
+            }
+        }
+        let combinations: Vec<String> = legend.entries.iter().map(|e| e.label.clone()).collect();
         let mut cells = vec![vec![None; combinations.len()]; places.len()];
-        for run in &results.runs {
-            let p = places.iter().position(|p| *p == place(results, run));
-            let c = combinations.iter().position(|c| *c == combination(results, run));
+        for (run, n) in results.runs.iter().zip(&names) {
+            let p = places.iter().position(|p| *p == n.place);
+            let c = combinations.iter().position(|c| *c == n.combination);
             if let (Some(p), Some(c)) = (p, c) {
                 cells[p][c].get_or_insert(run);
             }
         }
-        Grid { results, places, combinations, cells }
+        let variant_of = legend.entries.iter().map(|e| e.variant).collect();
+        Grid { results, legend, places, combinations, variant_of, cells, names }
     }
 
     pub fn runs(&self) -> impl Iterator<Item = &'a RunResult> + '_ {
         self.cells.iter().flatten().filter_map(|c| *c)
+    }
+
+    /// All runs of the study with their names.
+    pub fn named(&self) -> impl Iterator<Item = (&'a RunResult, &Names)> + '_ {
+        self.results.runs.iter().zip(&self.names)
+    }
+
+    pub fn look(&self, combination: &str) -> Look {
+        self.legend.look(combination)
     }
 }

@@ -55,11 +55,12 @@ pub fn write(results: &StudyResults, claims: &[Claim], out_dir: &Path) -> Result
     let judged = claims::judge_all(results, claims);
     let figures = charts::all(&grid, &judged);
     let tables = vec![
+        findings::best_table(&grid),
         tables::times(&grid),
         tables::memory(&grid),
         tables::build(&grid),
         tables::errors(&grid),
-        tables::problems(results),
+        tables::problems(&grid),
         tables::excluded(results),
         tables::claims(&judged),
         tables::environments(results),

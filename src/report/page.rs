@@ -37,7 +37,7 @@ fn style_sheet() -> String {
     for (light, dark) in DARK {
         let _ = writeln!(
             css,
-            "figure svg [fill=\"#{light:06X}\"] {{ fill:#{dark:06X} }} figure svg [stroke=\"#{light:06X}\"] {{ stroke:#{dark:06X} }}"
+            "svg [fill=\"#{light:06X}\"] {{ fill:#{dark:06X} }} svg [stroke=\"#{light:06X}\"] {{ stroke:#{dark:06X} }}"
         );
     }
     css + "}\n@media print { figure svg { min-width:0 } }\n"
@@ -65,9 +65,9 @@ pub fn document(content: &Content) -> String {
     if !problems.is_empty() {
         out += &section("gaps", "What is missing, and why", &problems);
     }
-    let time = ["total-time", "total-time-modelled", "time-per-frame", "triangles-per-frame"];
+    let time = ["total-time-modelled", "total-time", "time-per-frame", "triangles-per-frame"];
     out += &section("times-section", "Time and work", &(figures(content, &time) + &table(content, "times")));
-    let error = ["time-against-error", "time-against-error-modelled", "time-against-over-submission"];
+    let error = ["time-against-error-modelled", "time-against-error", "time-against-over-submission"];
     out += &section("errors-section", "Errors", &(figures(content, &error) + &table(content, "errors")));
     let body = figures(content, &["memory"]) + &table(content, "memory");
     out += &section("memory-section", "Memory", &body);
@@ -146,11 +146,12 @@ fn what_was_run(grid: &Grid) -> String {
 
 fn findings_html(content: &Content) -> String {
     let mut out = String::from("<ul class=\"findings\">\n");
-    for finding in findings(content.grid) {
+    for finding in findings(content.grid, content.judged) {
         let _ = writeln!(out, "<li>{}</li>", html(&finding));
     }
     out + "</ul>\n<p class=\"note\">Computed from the data below. Brackets: 95 % bootstrap interval over repeats. \
-           “Modelled” times are derived, not measured.</p>\n"
+           “Modelled” times are derived, not measured; † may lose visible triangles by design.</p>\n"
+        + &table(content, "best")
 }
 
 fn claims_html(content: &Content) -> String {

@@ -106,7 +106,7 @@ fn json(table: &Table) -> Value {
     let row = |cells: &Vec<Cell>| {
         let pairs = table.columns.iter().zip(cells).map(|(c, cell)| {
             let value = match cell {
-                Cell::Text(t) => json!(t),
+                Cell::Text(t) | Cell::Named(t, _) => json!(t),
                 Cell::Number(x) => json!(x),
                 Cell::Interval(v, low, high) => json!({"value": v, "low": low, "high": high}),
                 Cell::Status(_) => json!(cell.show()),

@@ -3,7 +3,7 @@
 use super::figure::{Anchor, Figure, Mark, TextStyle};
 use super::font;
 use super::format::html;
-use super::style::{Colour, PAPER};
+use super::style::{Colour, Look, PAPER};
 use crate::error::{Error, Result};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -27,6 +27,20 @@ pub fn svg(figure: &Figure, paper: bool) -> Result<String> {
         draw(figure, &root, SVG_FINE, 1.24, Baseline::AtAnchor, paper)?;
     }
     Ok(finish_svg(&out, figure))
+}
+
+/// A marker to stand before a name in the text of a page.
+pub fn swatch(look: Look) -> String {
+    let mut figure = Figure::new("swatch", "", 12.0, 12.0);
+    figure.marker(6.0, 6.0, 4.4, look.shape, look.colour, 1.0);
+    let body = match figure.marks.first() {
+        Some(Mark::Polygon { points, .. }) => {
+            let points: Vec<String> = points.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+            format!("<polygon points=\"{}\" fill=\"#{:06X}\"/>", points.join(" "), look.colour)
+        }
+        _ => format!("<circle cx=\"6\" cy=\"6\" r=\"4.4\" fill=\"#{:06X}\"/>", look.colour),
+    };
+    format!("<svg class=\"w\" width=\"12\" height=\"12\" aria-hidden=\"true\">{body}</svg> ")
 }
 
 /// Gives the document its real size, a title and a description for screen

@@ -7,7 +7,8 @@ use super::figure::{Figure, Part, Rect, plain};
 use super::font;
 use super::labels::Grid;
 use super::scale::Scale;
-use super::style::{ALARM, Colour, INK, Legend, MUTED, SHADE};
+use super::style::{ALARM, Colour, IDLE, INK, MUTED, SHADE};
+use crate::culling::Class;
 use crate::results::{RunResult, RunStatus};
 
 const ROW: f64 = 19.0;
@@ -39,6 +40,8 @@ pub struct Rows<'a> {
     pub axis: &'a str,
     /// Always from zero, as bars must be.
     pub linear: bool,
+    /// Write beside a time what was lost for it.
+    pub errors: bool,
     pub datum: &'a dyn Fn(&RunResult) -> Option<Datum>,
 }
 
@@ -53,7 +56,7 @@ pub fn absence(run: Option<&RunResult>) -> (&'static str, bool, Colour) {
     }
 }
 
-pub fn draw(grid: &Grid, legend: &Legend, what: &Rows) -> Figure {
+pub fn draw(grid: &Grid, what: &Rows) -> Figure {
     let data: Vec<Vec<Option<Datum>>> = grid
         .cells
         .iter()
@@ -66,7 +69,7 @@ pub fn draw(grid: &Grid, legend: &Legend, what: &Rows) -> Figure {
         .iter()
         .zip(&data)
         .flat_map(|(cells, data)| cells.iter().zip(data))
-        .filter(|(cell, _)| cell.is_some_and(|r| r.culling != "none"))
+        .filter(|(cell, _)| cell.is_some_and(|r| r.culling != IDLE))
         .flat_map(|(_, datum)| datum.iter().flat_map(Datum::extent))
         .collect();
     let linear = what.linear || !Scale::fitting(&working).is_log();
@@ -104,9 +107,14 @@ pub fn draw(grid: &Grid, legend: &Legend, what: &Rows) -> Figure {
                 let x = left - 12.0;
                 figure.label(x, y + 3.8, label, plain(BODY, INK).end());
             }
-            let look = legend.look(label);
+            let look = grid.legend.entries[c].look;
             match &data[i][c] {
-                Some(datum) => draw_datum(&mut figure, &scale, y, datum, look),
+                Some(datum) => {
+                    draw_datum(&mut figure, &scale, y, datum, look);
+                    if what.errors {
+                        note_error(&mut figure, &scale, plot, y, datum, grid.cells[i][c]);
+                    }
+                }
                 None => draw_absence(&mut figure, plot, y, grid.cells[i][c]),
             }
         }
@@ -137,6 +145,36 @@ fn draw_datum(figure: &mut Figure, scale: &Scale, y: f64, datum: &Datum, look: s
             }
         }
     }
+}
+
+/// The speed of a method that may lose triangles never stands without its error.
+fn note_error(figure: &mut Figure, scale: &Scale, plot: Rect, y: f64, datum: &Datum, run: Option<&RunResult>) {
+    let Some(words) = run.and_then(price) else { return };
+    let extent = datum.extent();
+    let high = extent.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let low = extent.iter().copied().fold(f64::INFINITY, f64::min);
+    let w = font::width(&words, SMALL, false);
+    let (right, left) = (scale.at(high) + 9.0, scale.at(low) - 9.0);
+    let style = plain(SMALL, ALARM);
+    if right + w <= plot.right() + 20.0 {
+        figure.label(right, y + 3.6, &words, style);
+    } else if left - w >= plot.x {
+        figure.label(left, y + 3.6, &words, style.end());
+    }
+}
+
+/// "† 120 ppm" for a run whose class lets it lose visible triangles.
+pub fn price(run: &RunResult) -> Option<String> {
+    if !may_lose(run) {
+        return None;
+    }
+    let lost = super::metrics::known("false_cull_ppm").value(run);
+    Some(lost.map_or_else(|| "† not judged".into(), |ppm| format!("† {} ppm", super::format::number(ppm, 2))))
+}
+
+/// Whether the declared class allows visible triangles to be lost.
+pub fn may_lose(run: &RunResult) -> bool {
+    matches!(run.class, Some(Class::Aggressive | Class::Approximate))
 }
 
 fn draw_absence(figure: &mut Figure, plot: Rect, y: f64, run: Option<&RunResult>) {

@@ -5,8 +5,9 @@ use super::facets::{self, SMALL, Sample};
 use super::figure::{Anchor, Figure, Part, Rect, TextStyle, plain, text_box};
 use super::labels::Grid;
 use super::pareto;
+use super::rows;
 use super::scale::{Kind, Scale};
-use super::style::{FRAME, INK, Legend, MUTED, SHADE};
+use super::style::{ALARM, FRAME, INK, MUTED, SHADE};
 use crate::results::{RunResult, RunStatus};
 
 pub struct Scatter<'a> {
@@ -23,26 +24,28 @@ pub struct Scatter<'a> {
 struct Dot {
     combination: usize,
     data: (f64, f64),
+    /// "† 120 ppm" when its class may lose triangles.
+    price: Option<String>,
     at: (f64, f64),
     on_front: bool,
 }
 
-pub fn draw(grid: &Grid, legend: &Legend, what: &Scatter) -> Figure {
+pub fn draw(grid: &Grid, what: &Scatter) -> Figure {
     let columns = grid.places.len().clamp(1, 2);
     let rows = grid.places.len().div_ceil(columns);
     let (w, h) = if columns == 1 { (840.0, 320.0) } else { (404.0, 236.0) };
     let (left, gap) = (74.0, (84.0, 78.0));
     let width = left + columns as f64 * w + (columns as f64 - 1.0) * gap.0 + 28.0;
-    let top = 58.0 + facets::legend_height(legend, width - 32.0) + 26.0;
+    let top = 58.0 + facets::legend_height(&grid.legend, width - 32.0, Sample::Marker) + 26.0;
     let height = top + rows as f64 * h + (rows as f64 - 1.0) * gap.1 + 46.0;
     let mut figure = Figure::new(what.id, what.title, width, height);
     facets::title(&mut figure, what.title, what.sub);
-    facets::legend(&mut figure, legend, 16.0, 58.0, width - 32.0, Sample::Marker);
+    facets::legend(&mut figure, &grid.legend, 16.0, 58.0, width - 32.0, Sample::Marker);
     let mut words = format!("{}. {} against {}. ", what.title, what.y_axis, what.x_axis);
 
     for (i, plot) in facets::panels(grid.places.len(), columns, left, top, (w, h), gap).into_iter().enumerate() {
         figure.part(Part::Plot, plot);
-        let dots = panel(&mut figure, grid, legend, what, i, plot);
+        let dots = panel(&mut figure, grid, what, i, plot);
         let front: Vec<&str> =
             dots.iter().filter(|d| d.on_front).map(|d| grid.combinations[d.combination].as_str()).collect();
         words += &format!("{}: on the front {}. ", grid.places[i], front.join(", "));
@@ -51,18 +54,28 @@ pub fn draw(grid: &Grid, legend: &Legend, what: &Scatter) -> Figure {
     figure
 }
 
-fn panel(figure: &mut Figure, grid: &Grid, legend: &Legend, what: &Scatter, place: usize, plot: Rect) -> Vec<Dot> {
+fn panel(figure: &mut Figure, grid: &Grid, what: &Scatter, place: usize, plot: Rect) -> Vec<Dot> {
     let mut dots: Vec<Dot> = grid.cells[place]
         .iter()
         .enumerate()
         .filter_map(|(combination, cell)| {
-            let data = cell.filter(|r| r.status == RunStatus::Done).and_then(what.point)?;
-            Some(Dot { combination, data, at: (0.0, 0.0), on_front: false })
+            let run = cell.filter(|r| r.status == RunStatus::Done)?;
+            let data = (what.point)(run)?;
+            Some(Dot { combination, data, price: rows::price(run), at: (0.0, 0.0), on_front: false })
         })
         .collect();
-    let without = grid.cells[place].iter().filter(|c| c.is_some()).count() - dots.len();
-    let note = if without > 0 { format!("{without} without a point") } else { String::new() };
-    facets::panel_head(figure, plot, &grid.places[place], &note);
+    let zeros = dots.iter().filter(|d| d.data.1 <= 0.0).count();
+    let gaps = grid.cells[place].iter().flatten().filter(|r| r.status != RunStatus::Done).count();
+    let mut notes = Vec::new();
+    if what.zero_bin && zeros == dots.len() && zeros > 0 {
+        notes.push(format!("none of the {zeros} lost a sampled pixel: only time differs"));
+    } else if what.zero_bin && zeros > 0 {
+        notes.push(format!("{zeros} of {} lost no sampled pixel", dots.len()));
+    }
+    if gaps > 0 {
+        notes.push(format!("{gaps} without a usable run"));
+    }
+    facets::panel_head(figure, plot, &grid.places[place], &notes.join("; "));
 
     let xs: Vec<f64> = dots.iter().map(|d| d.data.0).collect();
     let ys: Vec<f64> = dots.iter().map(|d| d.data.1).collect();
@@ -70,10 +83,13 @@ fn panel(figure: &mut Figure, grid: &Grid, legend: &Legend, what: &Scatter, plac
     let x = Scale::fitting(&xs);
     let inset = if x.is_log() { 14.0 } else { 0.0 };
     let x = x.onto(plot.x + inset, plot.right() - 14.0);
-    let zeros = ys.iter().filter(|y| **y <= 0.0).count();
     let y = if what.zero_bin {
         // Room for names above and below the points at zero.
-        let bin = if zeros == ys.len() { plot.h } else { if zeros == 0 { 22.0 } else { 64.0 } };
+        let bin = match zeros {
+            0 => 22.0,
+            n if n == ys.len() => plot.h,
+            _ => 64.0,
+        };
         let mut y = Scale::log(ys.iter().copied()).onto(plot.bottom(), plot.y);
         y.kind = Kind::LogZero(bin);
         zero_bin(figure, plot, bin, zeros == ys.len());
@@ -97,12 +113,12 @@ fn panel(figure: &mut Figure, grid: &Grid, legend: &Legend, what: &Scatter, plac
     figure.dashed(&stairs, MUTED, 1.1, 0.9, &[4.0, 3.0]);
     for on_front in [false, true] {
         for dot in dots.iter().filter(|d| d.on_front == on_front) {
-            let look = legend.look(&grid.combinations[dot.combination]);
+            let look = grid.legend.entries[dot.combination].look;
             let (radius, alpha) = if on_front { (5.0, 1.0) } else { (4.2, 0.45) };
             figure.marker(dot.at.0, dot.at.1, radius, look.shape, look.colour, alpha);
         }
     }
-    name_dots(figure, grid, &dots, &stairs, plot);
+    name_front(figure, grid, &dots, &stairs, plot);
     dots
 }
 
@@ -127,28 +143,33 @@ fn staircase(front: &[(f64, f64)], plot: Rect) -> Vec<(f64, f64)> {
     line
 }
 
-/// Names beside the dots, the front first, clear of dots, of the front's line
-/// and of each other. What is dominated gets its name where there is room right
-/// beside it; the legend names everything.
-fn name_dots(figure: &mut Figure, grid: &Grid, dots: &[Dot], stairs: &[(f64, f64)], plot: Rect) {
+/// Names of the dots on the front, clear of dots, of the front's line and of
+/// each other, with the price of those that may lose triangles. The legend
+/// names everything else.
+fn name_front(figure: &mut Figure, grid: &Grid, dots: &[Dot], stairs: &[(f64, f64)], plot: Rect) {
     let mut taken: Vec<Rect> = dots.iter().map(|d| Rect::new(d.at.0 - 5.0, d.at.1 - 5.0, 10.0, 10.0)).collect();
     taken.extend(stairs.windows(2).map(|s| {
         let (x, y) = (s[0].0.min(s[1].0), s[0].1.min(s[1].1));
         Rect::new(x - 1.0, y - 1.0, (s[1].0 - s[0].0).abs() + 2.0, (s[1].1 - s[0].1).abs() + 2.0)
     }));
-    let mut order: Vec<&Dot> = dots.iter().collect();
-    let key = |d: &Dot| (!d.on_front, d.at.0, d.combination);
-    order.sort_by(|a, b| {
-        let (a, b) = (key(a), key(b));
-        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))
-    });
+    let mut order: Vec<&Dot> = dots.iter().filter(|d| d.on_front).collect();
+    order.sort_by(|a, b| a.at.0.total_cmp(&b.at.0).then(a.combination.cmp(&b.combination)));
     for dot in order {
         let name = &grid.combinations[dot.combination];
-        let colour = if dot.on_front { INK } else { MUTED };
-        let style = TextStyle { bold: dot.on_front, ..plain(SMALL, colour) };
-        let Some((r, style, x, y)) = free_place(dot.at, name, style, plot, &taken) else { continue };
-        figure.label(x, y, name, style);
+        let (text, colour) = match &dot.price {
+            Some(price) => (format!("{name} {price}"), ALARM),
+            None => (name.clone(), INK),
+        };
+        let style = plain(SMALL, colour).bold();
+        let Some((r, style, x, y)) = free_place(dot.at, &text, style, plot, &taken) else { continue };
+        figure.label(x, y, &text, style);
         taken.push(r);
+        // A name that had to move away gets a thin line back to its dot.
+        let near = (x - dot.at.0).hypot(y - dot.at.1) < 20.0;
+        if !near {
+            let from = (dot.at.0.clamp(r.x, r.right()), if r.y > dot.at.1 { r.y } else { r.bottom() });
+            figure.segment(from, dot.at, FRAME, 0.8);
+        }
     }
 }
 
@@ -160,7 +181,7 @@ fn free_place(
     plot: Rect,
     taken: &[Rect],
 ) -> Option<(Rect, TextStyle, f64, f64)> {
-    let places = [
+    let beside = [
         (Anchor::Start, 9.0, 3.6),
         (Anchor::Start, 7.0, -5.0),
         (Anchor::Start, 7.0, 13.0),
@@ -170,7 +191,12 @@ fn free_place(
         (Anchor::Middle, 0.0, -9.0),
         (Anchor::Middle, 0.0, 17.0),
     ];
-    places.into_iter().find_map(|(anchor, dx, dy)| {
+    // Then farther and farther above and below, as long as the panel lasts.
+    let away = (2..14).flat_map(|n| {
+        let d = 13.0 * f64::from(n);
+        [(Anchor::Start, 6.0, -d), (Anchor::Start, 6.0, d), (Anchor::End, -6.0, -d), (Anchor::End, -6.0, d)]
+    });
+    beside.into_iter().chain(away).find_map(|(anchor, dx, dy)| {
         let style = TextStyle { anchor, ..style };
         let (x, y) = (at.0 + dx, at.1 + dy);
         let r = text_box(x, y, name, style);

@@ -1,6 +1,6 @@
 //! How a combination looks: the same colour, marker and dash in every chart.
 
-use crate::results::StudyResults;
+use super::labels::Names;
 
 /// 0xRRGGBB.
 pub type Colour = u32;
@@ -52,7 +52,8 @@ pub enum Shape {
 const SHAPES: [Shape; 6] = [Shape::Circle, Shape::Square, Shape::Diamond, Shape::Up, Shape::Down, Shape::Cross];
 
 /// On and off lengths in pixels; empty is solid.
-const DASHES: [&[f64]; 4] = [&[], &[7.0, 3.0], &[2.0, 2.5], &[9.0, 2.5, 2.0, 2.5]];
+const DASHES: [&[f64]; 6] =
+    [&[], &[7.0, 3.0], &[2.0, 2.5], &[9.0, 2.5, 2.0, 2.5], &[13.0, 4.0], &[6.0, 2.0, 2.0, 2.0, 2.0, 2.0]];
 
 /// Looks of one combination.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,32 +66,81 @@ pub struct Look {
 impl Look {
     /// 7 colours, 6 shapes and 4 dashes: 7 and 6 as well as 7 and 4 have no common
     /// divisor, so 28 combinations differ in lines and 42 in markers.
-    pub fn nth(i: usize) -> Look {
+    fn nth(i: usize) -> Look {
         Look { colour: PALETTE[i % 7], shape: SHAPES[i % 6], dash: DASHES[i % 4] }
     }
 }
 
-/// The combinations of a study in the order of the matrix, with their looks.
 #[derive(Debug, Clone)]
+pub struct Entry {
+    pub label: String,
+    pub look: Look,
+    /// Index in [`Legend::variants`].
+    pub variant: usize,
+}
+
+/// The combinations of a study in the order of the matrix, with their looks.
+#[derive(Debug, Clone, Default)]
 pub struct Legend {
-    pub entries: Vec<(String, Look)>,
+    pub entries: Vec<Entry>,
+    /// Structures, with whatever else but culling sets combinations apart.
+    pub variants: Vec<String>,
+    pub cullings: Vec<String>,
+    /// Colour means culling and shape means structure; else every combination
+    /// has a look of its own, because there are too many of either.
+    pub systematic: bool,
 }
 
 impl Legend {
-    pub fn of(results: &StudyResults) -> Legend {
-        let mut legend = Legend { entries: Vec::new() };
-        for run in &results.runs {
-            let label = super::labels::combination(results, run);
-            if !legend.entries.iter().any(|(l, _)| *l == label) {
+    pub fn of(names: &[Names]) -> Legend {
+        let mut legend = Legend::default();
+        let at = |list: &mut Vec<String>, name: &str| match list.iter().position(|n| n == name) {
+            Some(i) => i,
+            None => {
+                list.push(name.to_string());
+                list.len() - 1
+            }
+        };
+        let mut cells = Vec::new();
+        for n in names {
+            let variant = at(&mut legend.variants, &n.variant);
+            let culling = at(&mut legend.cullings, &n.culling);
+            if !legend.entries.iter().any(|e| e.label == n.combination) {
                 let look = Look::nth(legend.entries.len());
-                legend.entries.push((label, look));
+                legend.entries.push(Entry { label: n.combination.clone(), look, variant });
+                cells.push(culling);
+            }
+        }
+        legend.systematic = legend.variants.len() <= SHAPES.len()
+            && legend.cullings.iter().filter(|c| *c != IDLE).count() <= PALETTE.len();
+        if legend.systematic {
+            let colours: Vec<Colour> = legend.cullings.iter().map(|c| legend.culling_colour(c)).collect();
+            for (entry, culling) in legend.entries.iter_mut().zip(cells) {
+                let (shape, dash) = (SHAPES[entry.variant], DASHES[entry.variant]);
+                entry.look = Look { colour: colours[culling], shape, dash };
             }
         }
         legend
     }
 
+    /// Grey for whoever culls nothing, the palette for the rest in order.
+    pub fn culling_colour(&self, culling: &str) -> Colour {
+        if culling == IDLE {
+            return MUTED;
+        }
+        let i = self.cullings.iter().filter(|c| *c != IDLE).position(|c| c == culling);
+        PALETTE[i.unwrap_or(0) % PALETTE.len()]
+    }
+
+    pub fn variant_look(&self, variant: usize) -> Look {
+        Look { colour: INK, shape: SHAPES[variant % SHAPES.len()], dash: DASHES[variant % DASHES.len()] }
+    }
+
     pub fn look(&self, label: &str) -> Look {
-        let found = self.entries.iter().find(|(l, _)| l == label);
-        found.map_or(Look { colour: MUTED, shape: Shape::Circle, dash: &[] }, |(_, look)| *look)
+        let found = self.entries.iter().find(|e| e.label == label);
+        found.map_or(Look { colour: MUTED, shape: Shape::Circle, dash: &[] }, |e| e.look)
     }
 }
+
+/// Label of a culling sum without terms.
+pub const IDLE: &str = "none";

@@ -1,11 +1,15 @@
 //! One table, four ways out: HTML, CSV, Markdown, LaTeX (booktabs).
 
 use super::format;
+use super::render;
+use super::style::Look;
 use crate::results::RunStatus;
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell {
     Text(String),
+    /// A combination with its look in the charts.
+    Named(String, Look),
     Number(f64),
     /// Value, ends of its 95 % interval.
     Interval(f64, f64, f64),
@@ -74,7 +78,7 @@ impl Cell {
     /// For people.
     pub fn show(&self) -> String {
         match self {
-            Cell::Text(t) => t.clone(),
+            Cell::Text(t) | Cell::Named(t, _) => t.clone(),
             Cell::Number(x) => format::number(*x, 3),
             Cell::Interval(v, low, high) => format::interval(*v, *low, *high),
             Cell::Status(s) => status_word(*s).into(),
@@ -86,7 +90,7 @@ impl Cell {
     fn raw(&self, interval: bool) -> Vec<String> {
         let plain = |x: f64| if x.is_finite() { format!("{x}") } else { String::new() };
         let mut fields = match self {
-            Cell::Text(t) => vec![t.clone()],
+            Cell::Text(t) | Cell::Named(t, _) => vec![t.clone()],
             Cell::Number(x) => vec![plain(*x)],
             Cell::Interval(v, low, high) => vec![plain(*v), plain(*low), plain(*high)],
             Cell::Status(s) => vec![status_word(*s).into()],
@@ -152,7 +156,7 @@ impl Table {
 
     pub fn html(&self) -> String {
         let mut out = format!(
-            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-labelledby=\"t-{id}\"><table>\n<caption id=\"t-{id}\">{}</caption>\n<thead><tr>",
+            "<div class=\"scroll rows\" tabindex=\"0\" role=\"region\" aria-labelledby=\"t-{id}\"><table>\n<caption id=\"t-{id}\">{}</caption>\n<thead><tr>",
             format::html(&self.title),
             id = self.id,
         );
@@ -160,29 +164,17 @@ impl Table {
             let about =
                 if c.about.is_empty() { String::new() } else { format!(" title=\"{}\"", format::html(&c.about)) };
             let class = if c.numeric { " class=\"n\"" } else { "" };
-            let unit = if c.unit.is_empty() {
-                String::new()
-            } else {
-                format!(" <span class=\"unit\">{}</span>", format::html(&c.unit))
-            };
-            out += &format!("<th scope=\"col\"{class}{about}>{}{unit}</th>", format::html(&c.name));
+            // Value and interval are columns of their own, so that values align.
+            let (span, unit) = (if c.interval { " colspan=\"2\"" } else { "" }, format::html(&c.unit));
+            let unit = if unit.is_empty() { unit } else { format!(" <span class=\"unit\">{unit}</span>") };
+            let class = if c.interval { " class=\"i\"" } else { class };
+            out += &format!("<th scope=\"col\"{class}{span}{about}>{}{unit}</th>", format::html(&c.name));
         }
         out += "</tr></thead>\n<tbody>\n";
         for row in &self.rows {
             out += "<tr>";
             for (i, (cell, c)) in row.iter().zip(&self.columns).enumerate() {
-                let text = html_cell(cell);
-                let class = match cell {
-                    // Reasons wrap; names and numbers do not.
-                    Cell::Text(t) if t.chars().count() > 34 => " class=\"t\"",
-                    _ if c.numeric => " class=\"n\"",
-                    _ => "",
-                };
-                out += &if i < self.heads {
-                    format!("<th scope=\"row\">{text}</th>")
-                } else {
-                    format!("<td{class}>{text}</td>")
-                };
+                out += &html_cell(cell, c, i < self.heads);
             }
             out += "</tr>\n";
         }
@@ -216,17 +208,34 @@ impl Table {
     }
 }
 
-fn html_cell(cell: &Cell) -> String {
-    match cell {
+/// One table cell, or two for a value with its interval.
+fn html_cell(cell: &Cell, column: &Column, head: bool) -> String {
+    let text = match cell {
         Cell::Status(s) => format!("<span class=\"s {0}\">{0}</span>", status_word(*s)),
-        Cell::Interval(v, low, high) if low != high => format!(
-            "{} <span class=\"ci\">[{}, {}]</span>",
-            format::number(*v, 3),
-            format::number(*low, 3),
-            format::number(*high, 3)
-        ),
+        Cell::Named(t, look) => format!("{}{}", render::swatch(*look), format::html(t)),
+        Cell::Interval(v, ..) => format::number(*v, 3),
         other => format::html(&other.show()),
+    };
+    if head {
+        return format!("<th scope=\"row\">{text}</th>");
     }
+    let class = match cell {
+        // Reasons wrap; names and numbers do not.
+        Cell::Text(t) if t.chars().count() > 34 => " class=\"t\"",
+        _ if column.numeric => " class=\"n\"",
+        _ => "",
+    };
+    let mut out = format!("<td{class}>{text}</td>");
+    if column.interval {
+        let ends = match cell {
+            Cell::Interval(_, low, high) if low != high => {
+                format!("[{}, {}]", format::number(*low, 3), format::number(*high, 3))
+            }
+            _ => String::new(),
+        };
+        out += &format!("<td class=\"ci\">{ends}</td>");
+    }
+    out
 }
 
 fn csv_line(fields: &[String]) -> String {

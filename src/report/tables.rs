@@ -3,8 +3,9 @@
 
 use super::claims::Judged;
 use super::format::{self, count};
-use super::labels::{Grid, combination, place};
+use super::labels::{Grid, Names};
 use super::metrics::{Kind, Metric, known};
+use super::rows;
 use super::table::{Cell, Column, Table, column, interval, number};
 use crate::culling::Class;
 use crate::results::{RunResult, RunStatus, StudyResults};
@@ -27,16 +28,16 @@ fn by_run(grid: &Grid, id: &str, title: &str, metrics: &[(&str, &str)]) -> Table
     let mut columns = vec![Column::text("scene"), Column::text("combination"), Column::text("status")];
     columns.extend(metrics.iter().map(|(name, heading)| of(known(name), heading)));
     let mut table = Table::new(id, title, 2, columns);
-    for run in &grid.results.runs {
-        let mut row = vec![
-            Cell::Text(place(grid.results, run)),
-            Cell::Text(combination(grid.results, run)),
-            Cell::Status(run.status),
-        ];
+    for (run, names) in grid.named() {
+        let mut row = vec![Cell::Text(names.place.clone()), named(grid, names), Cell::Status(run.status)];
         row.extend(metrics.iter().map(|(name, _)| cell(known(name), run)));
         table.rows.push(row);
     }
     table
+}
+
+fn named(grid: &Grid, names: &Names) -> Cell {
+    Cell::Named(names.combination.clone(), grid.look(&names.combination))
 }
 
 pub fn times(grid: &Grid) -> Table {
@@ -54,15 +55,19 @@ pub fn times(grid: &Grid) -> Table {
             ("mean_nodes_visited", "nodes a frame"),
             ("trials", "trials"),
             ("noise", "noise"),
+            ("false_cull_ppm", "false-cull pixels"),
         ],
     );
+    table.columns.push(Column::text("class"));
     table.columns.push(Column::text("marks"));
     for (row, run) in table.rows.iter_mut().zip(&grid.results.runs) {
+        row.push(class_of(run));
         row.push(Cell::Text(marks(run)));
     }
     table.caption =
         "Brackets: 95 % bootstrap interval of the median over trials. Noise: sentinel kernel over its usual \
-                     time, worst trial; 1 is a quiet machine. “Modelled” is derived, not measured."
+                     time, worst trial; 1 is a quiet machine. “Modelled” is derived, not measured. †: may lose visible \
+                     triangles by design; read its times beside its false-cull pixels."
             .into();
     table
 }
@@ -131,13 +136,18 @@ pub fn errors(grid: &Grid) -> Table {
     );
     table.columns.insert(3, Column::text("class"));
     for (row, run) in table.rows.iter_mut().zip(&grid.results.runs) {
-        row.insert(3, run.class.map_or(Cell::Missing, |c| Cell::Text(class_word(c).into())));
+        row.insert(3, class_of(run));
     }
     table.caption = "False culls: visible triangles that were not submitted, summed over the judged frames. \
                      False-cull pixels: per million pixels. Over-submission: submitted over visible triangles. \
                      An empty cell was not judged; a zero was."
         .into();
     table
+}
+
+fn class_of(run: &RunResult) -> Cell {
+    let dagger = if rows::may_lose(run) { "† " } else { "" };
+    run.class.map_or(Cell::Missing, |c| Cell::Text(format!("{dagger}{}", class_word(c))))
 }
 
 pub fn class_word(class: Class) -> &'static str {
@@ -151,15 +161,15 @@ pub fn class_word(class: Class) -> &'static str {
 }
 
 /// What failed, is wrong or has yet to run, with its reason.
-pub fn problems(results: &StudyResults) -> Table {
+pub fn problems(grid: &Grid) -> Table {
     let columns = ["scene", "combination", "status", "reason"].map(Column::text).to_vec();
     let mut table = Table::new("problems", "Failed, wrong and pending", 2, columns);
-    for run in results.runs.iter().filter(|r| r.status != RunStatus::Done) {
+    for (run, names) in grid.named().filter(|(r, _)| r.status != RunStatus::Done) {
         let fallback =
             if run.status == RunStatus::Pending { "not started, or trials are missing" } else { "no reason stored" };
         table.rows.push(vec![
-            Cell::Text(place(results, run)),
-            Cell::Text(combination(results, run)),
+            Cell::Text(names.place.clone()),
+            named(grid, names),
             Cell::Status(run.status),
             Cell::Text(run.reason.clone().unwrap_or_else(|| fallback.into())),
         ]);
