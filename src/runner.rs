@@ -219,11 +219,11 @@ pub fn time_trial(spec: &RunSpec, cache: &Path) -> Result<TrialRecord> {
         let mut tally = Tally::default();
         let mut times_ns = Vec::with_capacity(frames);
         let switches_before = machine::involuntary_switches();
-        for frame in 0..frames {
+        for (frame, counted) in work.iter().enumerate() {
             let start = Instant::now();
             setup.cull(frame, &mut list, &mut tally);
             times_ns.push(elapsed_ns(start) as f64);
-            if hash_ranges(&list) != work[frame].hash {
+            if hash_ranges(&list) != counted.hash {
                 return Err(Error::new(format!(
                     "pass {pass} submitted another set than the first pass in frame {frame}"
                 ))

@@ -166,7 +166,7 @@ pub fn to_toml(table: &Table) -> String {
 
 fn write_table(out: &mut String, path: &str, table: &Table) {
     let is_tables = |n: &Node| n.array().is_some_and(|a| !a.is_empty() && a.iter().all(Node::is_table));
-    for (key, node) in table.iter().filter(|(_, n)| !n.is_table() && !(path.is_empty() && is_tables(n))) {
+    for (key, node) in table.iter().filter(|(_, n)| !(n.is_table() || path.is_empty() && is_tables(n))) {
         let _ = writeln!(out, "{} = {}", bare(&key.name), inline(node));
     }
     for (key, node) in table {

@@ -296,7 +296,9 @@ mod tests {
         );
         assert_eq!(verdict(Class::Aggressive, &frames), None);
         let hidden = FrameErrors { false_culls: 0, false_cull_pixels: 0, ..lost };
-        assert!(verdict(Class::Conservative, &[hidden.clone()]).unwrap().contains("hidden from every sample"));
+        assert!(
+            verdict(Class::Conservative, std::slice::from_ref(&hidden)).unwrap().contains("hidden from every sample")
+        );
         assert_eq!(verdict(Class::SampleConservative, &[hidden]), None);
         assert!(verdict(Class::Exact, std::slice::from_ref(&fine)).unwrap().contains("the exact set holds 4"));
         assert_eq!(verdict(Class::Conservative, &[fine]), None);

@@ -151,7 +151,11 @@ pub fn x_axis(figure: &mut Figure, plot: Rect, scale: &Scale, wanted: usize, lab
         }
         figure.segment((x, plot.y), (x, plot.bottom()), GRID, 1.0);
         figure.segment((x, plot.bottom()), (x, plot.bottom() + 4.0), FRAME, 1.0);
-        let style = plain(SMALL, MUTED).middle();
+        // A label at the right end stays within its panel: the next one begins there.
+        let middle = plain(SMALL, MUTED).middle();
+        let over = text_box(x, 0.0, &tick.label, middle).right() > plot.right() + 6.0;
+        let style = if over { plain(SMALL, MUTED).end() } else { middle };
+        let x = if over { plot.right() } else { x };
         let r = text_box(x, plot.bottom() + 15.0, &tick.label, style);
         if labels && r.x > free_from {
             figure.label(x, plot.bottom() + 15.0, &tick.label, style);

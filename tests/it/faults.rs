@@ -131,7 +131,7 @@ fn a_study_runs_to_its_end_and_a_second_time_does_nothing() {
 #[test]
 fn a_time_out_fails_its_run_with_the_limit_in_the_reason() {
     let town = Town::new(4);
-    let out = town.run(&["--set", "measure.timeout_s=0.01"]);
+    let out = town.run(&["--set", "measure.timeout_s=0.001"]);
     assert_eq!(out.status.code(), Some(1));
     let reasons = town.reasons();
     assert_eq!(reasons.len(), 4);
@@ -155,9 +155,9 @@ fn a_killed_child_is_named_and_its_trial_taken_again() {
     let town = Town::new(4);
     // Trials alone, one after the other: a kill meant for the first attempt must not meet the second.
     let mut run = town.start(&["--set", "measure.repeats=6", "--set", "accuracy.frames=0"]);
-    let mut lines = BufReader::new(run.stdout.take().unwrap()).lines();
+    let lines = BufReader::new(run.stdout.take().unwrap()).lines();
     let (mut seen, mut killed) = (Vec::<Value>::new(), 0);
-    while let Some(line) = lines.next() {
+    for line in lines {
         seen.push(serde_json::from_str(&line.unwrap()).unwrap());
         // Kill until one is seen to have died of it: a child may be through before the signal.
         if killed < 20

@@ -229,16 +229,14 @@ fn a_walk_is_decided_by_its_seed_and_sees_both_floors() {
 #[test]
 fn walks_fly_round_a_statuette_and_refuse_an_empty_scene() {
     // A pyramid of 20 cm, with no floor beside it.
-    let mut scene = Scene::default();
-    scene.positions = vec![
-        DVec3::new(-0.1, -0.1, 0.0),
-        DVec3::new(0.1, -0.1, 0.0),
-        DVec3::new(0.0, 0.1, 0.0),
-        DVec3::new(0.0, 0.0, 0.2),
-    ];
-    scene.triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
-    scene.source_triangle_id = vec![0, 1, 2, 3];
-    scene.two_sided = vec![false; 4];
+    let corners = [(-0.1, -0.1, 0.0), (0.1, -0.1, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.2)];
+    let scene = Scene {
+        positions: corners.map(DVec3::from).to_vec(),
+        triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+        source_triangle_id: vec![0, 1, 2, 3],
+        two_sided: vec![false; 4],
+        ..Default::default()
+    };
     let poses = walked("walk:frames=100", &scene);
     assert_eq!(poses.len(), 100);
     assert_eq!(first_crossing(&scene, &poses), None);

@@ -73,7 +73,7 @@ fn nasty_scene(rng: &mut Rng, seed: u64) -> (Scene, f64, DVec3) {
 fn nasty_view(rng: &mut Rng, scene: &Scene, size: f64, offset: DVec3, i: usize) -> View {
     let projection = match i % 4 {
         0 => Projection::Orthographic { height_m: size * rng.unit() + 0.01 },
-        _ => Projection::Perspective { fov_y_rad: [1e-4, 1.0, 1.6, 3.14][rng.below(4)] },
+        _ => Projection::Perspective { fov_y_rad: [1e-4, 1.0, 1.6, 3.1][rng.below(4)] },
     };
     let near_m = [1e-6, 0.1, size * 0.2][rng.below(3)];
     let far_m = (rng.below(2) == 0).then(|| near_m + size * (rng.unit() + 0.01));

@@ -132,7 +132,7 @@ pub fn run(
     let trials = summaries.collect();
     let approximate = culling.contains("octant_mask");
     let lost = |f: u32, rng: &mut Random| {
-        if approximate && f % 3 == 0 { (rng.unit() * 40.0 * per_triangle * 20.0) as u64 } else { 0 }
+        if approximate && f.is_multiple_of(3) { (rng.unit() * 40.0 * per_triangle * 20.0) as u64 } else { 0 }
     };
     let errors = (0..20)
         .map(|i| {

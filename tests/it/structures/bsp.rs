@@ -173,7 +173,7 @@ fn a_tree_that_splits_without_end_says_which_parameter_to_change() {
     // Large triangles that pass through each other.
     let scene = soup(2, 400, 10.0, 8.0);
     let (s, _) = structure::make(&Spec::parse("bsp:min_leaf=20").unwrap()).unwrap();
-    let e = s.build(&scene).err().expect("thousands of mutual intersections");
+    let e = s.build(&scene).expect_err("thousands of mutual intersections");
     assert_eq!(e.key.as_deref(), Some("split_weight"));
     assert!(e.to_string().contains("min_leaf") && e.message.contains("4 pieces a triangle"), "{e}");
 }
