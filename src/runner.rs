@@ -265,6 +265,15 @@ fn record(
         let value = work.iter().map(|w| w.tally.named()[i].2 as f64).sum();
         counters.push(Counter { name: name.to_string(), unit: unit.to_string(), value });
     }
+    let load = &setup.scene.report;
+    for (name, value) in [
+        ("faces_in_file", load.triangles_in_file),
+        ("faces_dropped_non_finite", load.dropped_non_finite),
+        ("faces_dropped_out_of_range", load.dropped_out_of_range),
+        ("faces_dropped_degenerate", load.dropped_degenerate),
+    ] {
+        counters.push(Counter { name: name.into(), unit: "faces".into(), value: value as f64 });
+    }
     TrialRecord {
         load_ns: setup.load_ns,
         build_ns: setup.build_ns,

@@ -10,6 +10,7 @@ pub mod inspect;
 mod known;
 pub mod path;
 pub mod plan;
+pub mod preflight;
 pub mod progress;
 pub mod query;
 pub mod report;

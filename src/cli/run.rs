@@ -1,7 +1,7 @@
 //! `cullmark run`: manifest, matrix, queue, workers, results, report.
 
-use super::check;
 use super::progress::{Mode, Progress, duration, json_line};
+use super::{check, preflight};
 use crate::error::Error;
 use crate::machine;
 use crate::manifest::Manifest;
@@ -101,6 +101,12 @@ async fn study(
         Ok(matrix) => matrix,
         Err(errors) => return Ok(mistakes(&errors, args.json)),
     };
+    let folder = args.db.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_path_buf();
+    let cache_dir = args.cache_dir.clone().unwrap_or_else(|| folder.join("cache"));
+    let notes = match preflight::read(&matrix.runs, &cache_dir) {
+        Ok(notes) => notes,
+        Err(errors) => return Ok(mistakes(&errors, args.json)),
+    };
     let submitted = store.submit(&submission(args, manifest, &matrix, machine_class, series)).await?;
     let mode = match (args.json, args.quiet) {
         (true, _) => Mode::Json,
@@ -108,15 +114,15 @@ async fn study(
         _ => Mode::Bar,
     };
     announce(mode, manifest, &matrix, &submitted, series);
+    for note in &notes {
+        match mode {
+            Mode::Json => json_line(&serde_json::json!({ "event": "note", "text": note })),
+            _ => eprintln!("note: {note}"),
+        }
+    }
 
     let progress = Arc::new(Progress::new(mode, &submitted, auxiliary));
-    let folder = args.db.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_path_buf();
-    let options = worker::Options {
-        launcher,
-        cache_dir: args.cache_dir.clone().unwrap_or_else(|| folder.join("cache")),
-        lane_file: lane::default_path(),
-        auxiliary,
-    };
+    let options = worker::Options { launcher, cache_dir, lane_file: lane::default_path(), auxiliary };
     let tell = {
         let progress = progress.clone();
         Arc::new(move |event| progress.on(&event))

@@ -4,7 +4,7 @@
 //! loops when it vectorises them for AVX-512, so none stands in a function that
 //! enables it. The operations and their order are those of `frustum_scalar`.
 
-use super::frustum_planes::{FramePlanes, GUARD, Plane32, PlaneMasks, Work};
+use super::frustum_planes::{FramePlanes, GUARD, PlaneMasks, Work};
 use crate::hierarchy::BoundsBlock;
 use std::arch::x86_64::*;
 
@@ -161,12 +161,7 @@ fn flat_512<const N: usize, const FAR: bool>(
     live: &[u8],
     outside: &mut [u8],
 ) -> Work {
-    // All that is the same for every box stays in registers: the loop is bound by its loads.
     let [ex, ey, ez] = frame.eye.map(|e| _mm512_set1_ps(e));
-    let planes: [&Plane32; N] = std::array::from_fn(|k| &frame.planes[k]);
-    let normals = planes.map(|p| p.normal.map(|n| _mm512_set1_ps(n)));
-    let offsets = planes.map(|p| _mm512_set1_ps(p.d_out));
-    let corners = planes.map(|p| p.p.map(|c| c & 7));
     let minus_guard = _mm512_set1_ps(-GUARD);
     let mut work = Work::default();
     let count = bounds.len().min(live.len()).min(outside.len());
@@ -196,12 +191,11 @@ fn flat_512<const N: usize, const FAR: bool>(
             left |= u32::from(live[second] & !outside[second]) << 8;
         }
         work.lanes += u64::from(left.count_ones());
-        for k in 0..N {
+        for plane in &frame.planes[..N] {
             work.planes += u64::from(left.count_ones());
-            let [nx, ny, nz] = normals[k];
-            let [cx, cy, cz] = corners[k];
-            let s = _mm512_fmadd_ps(nx, a[cx], offsets[k]);
-            let s = _mm512_fmadd_ps(nz, a[cz], _mm512_fmadd_ps(ny, a[cy], s));
+            let [nx, ny, nz] = plane.normal.map(|n| _mm512_set1_ps(n));
+            let s = _mm512_fmadd_ps(nx, a[plane.p[0] & 7], _mm512_set1_ps(plane.d_out));
+            let s = _mm512_fmadd_ps(nz, a[plane.p[2] & 7], _mm512_fmadd_ps(ny, a[plane.p[1] & 7], s));
             left &= !u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(s, below));
         }
         outside[at] = !left as u8;

@@ -59,6 +59,7 @@ pub fn write(results: &StudyResults, claims: &[Claim], out_dir: &Path) -> Result
         tables::times(&grid),
         tables::memory(&grid),
         tables::build(&grid),
+        tables::scenes(results),
         tables::errors(&grid),
         tables::problems(&grid),
         tables::excluded(results),

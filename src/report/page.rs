@@ -71,7 +71,7 @@ pub fn document(content: &Content) -> String {
     out += &section("errors-section", "Errors", &(figures(content, &error) + &table(content, "errors")));
     let body = figures(content, &["memory"]) + &table(content, "memory");
     out += &section("memory-section", "Memory", &body);
-    let body = figures(content, &["build-time"]) + &table(content, "build");
+    let body = figures(content, &["build-time"]) + &table(content, "build") + &table(content, "scenes");
     out += &section("build-section", "Structures", &body);
     out += &section("methods", "Methods", &methods(content));
     out += "</main>\n<footer><p>Written by cullmark. Charts as SVG and PNG are in <code>charts/</code>, tables as CSV, \

@@ -8,6 +8,7 @@ use super::metrics::{Kind, Metric, known};
 use super::rows;
 use super::table::{Cell, Column, Table, column, interval, number};
 use crate::culling::Class;
+use crate::record::Winding;
 use crate::results::{RunResult, RunStatus, StudyResults};
 
 /// The column of a metric under a heading for people.
@@ -182,6 +183,35 @@ pub fn excluded(results: &StudyResults) -> Table {
     let mut table = Table::new("excluded", "Left out of the matrix", 1, columns);
     for e in &results.excluded {
         table.rows.push(vec![Cell::Text(e.cell.clone()), Cell::Text(e.why.clone()), Cell::Number(e.count as f64)]);
+    }
+    table
+}
+
+/// What was read of each scene, and what reading left out.
+pub fn scenes(results: &StudyResults) -> Table {
+    let counters = [
+        ("scene_triangles", "triangles", "triangles that take part"),
+        ("faces_in_file", "in the source", "triangles that the source holds"),
+        ("faces_dropped_non_finite", "NaN or infinite", "left out: a coordinate is NaN or infinite"),
+        ("faces_dropped_out_of_range", "out of range", "left out: a coordinate is beyond 1e12 m"),
+        ("faces_dropped_degenerate", "without area", "left out: no area"),
+    ];
+    let mut columns = vec![Column::text("scene"), Column::text("winding")];
+    columns.extend(counters.iter().map(|(_, name, about)| column(name, "", about)));
+    let mut table = Table::new("scenes", "Scenes as read", 1, columns);
+    let mut seen = std::collections::BTreeSet::new();
+    for run in results.runs.iter().filter(|r| !r.counters.is_empty()) {
+        if !seen.insert(&run.spec.scene.fingerprint) {
+            continue;
+        }
+        let winding = match run.spec.scene.winding {
+            Winding::Ccw => "counter-clockwise",
+            Winding::Cw => "clockwise",
+            Winding::TwoSided => "two-sided",
+        };
+        let mut row = vec![Cell::Text(run.spec.scene.name.clone()), Cell::Text(winding.into())];
+        row.extend(counters.iter().map(|(name, ..)| number(run.counters.get(*name).copied())));
+        table.rows.push(row);
     }
     table
 }
