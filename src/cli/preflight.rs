@@ -66,7 +66,8 @@ fn examine(run: &RunSpec, cache: &Path) -> Result<Vec<String>> {
     let step = poses.len().div_ceil(EYES);
     let eyes: Vec<DVec3> = poses.iter().step_by(step).map(|p| p.eye).collect();
     notes.extend(winding::warning_from(&scene, &eyes, run.scene.winding).map(|w| format!("{name}: {w}")));
-    notes.extend(report.warnings.iter().filter(|w| !w.starts_with("winding")).map(|w| format!("{name}: {w}")));
+    let told = |w: &&String| !w.starts_with("winding") && !w.starts_with("dropped faces");
+    notes.extend(report.warnings.iter().filter(told).map(|w| format!("{name}: {w}")));
     // An unwritable cache costs time only, as for scenes.
     let path = file(run, cache);
     if let (Some(folder), Ok(json)) = (path.parent(), serde_json::to_vec(&notes)) {

@@ -8,6 +8,7 @@ use crate::results::{RunResult, RunStatus, StudyResults};
 use crate::stats;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The order is from agreement to disagreement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,15 +104,30 @@ struct Pairs<'a> {
 }
 
 fn groups<'a>(results: &'a StudyResults, claim: &Claim) -> Vec<Pairs<'a>> {
+    let mut walks: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for run in &results.runs {
+        let structure = format_sum(std::slice::from_ref(&run.spec.structure));
+        walks.entry(structure).or_default().insert(run.spec.walk.to_string());
+    }
     let free = |run: &RunResult| -> String {
         let mut axes = vec!["scene", "path", "structure", "culling", "walk"];
         axes.extend(run.spec.axes.keys().map(String::as_str));
         axes.retain(|a| !claim.numerator.contains_key(*a) && !claim.denominator.contains_key(*a));
-        let values = axes.iter().map(|a| format!("{a}={}", format_sum(&axis_value(&run.spec, a))));
+        let value = |axis: &str| match axis {
+            // A structure's only walk is its own: a list is scanned, a tree descended,
+            // and a claim about structures compares the two.
+            "walk" if walks[&format_sum(std::slice::from_ref(&run.spec.structure))].len() == 1 => "its own".to_string(),
+            _ => format_sum(&axis_value(&run.spec, axis)),
+        };
+        let values = axes.iter().map(|a| format!("{a}={}", value(a)));
         // Times of different machines or series are never mixed; nor are scenes of two cameras.
         let key = format!("{} {} {:?}", run.machine_class, run.spec.series, run.spec.camera);
         values.chain([key]).collect::<Vec<_>>().join(";")
     };
+    let mut partners: BTreeMap<String, Vec<&RunResult>> = BTreeMap::new();
+    for b in results.runs.iter().filter(|b| selects(&claim.denominator, &b.spec)) {
+        partners.entry(free(b)).or_default().push(b);
+    }
     let mut groups: Vec<Pairs> = Vec::new();
     for a in results.runs.iter().filter(|r| selects(&claim.numerator, &r.spec)) {
         let name = match claim.for_each.as_deref() {
@@ -121,7 +137,7 @@ fn groups<'a>(results: &'a StudyResults, claim: &Claim) -> Vec<Pairs<'a>> {
             Some("structure") => a.structure.clone(),
             Some(axis) => format_sum(&axis_value(&a.spec, axis)),
         };
-        for b in results.runs.iter().filter(|b| selects(&claim.denominator, &b.spec) && free(a) == free(b)) {
+        for b in partners.get(&free(a)).into_iter().flatten().copied() {
             let group = match groups.iter_mut().position(|g| g.name == name) {
                 Some(i) => &mut groups[i],
                 None => {

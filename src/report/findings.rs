@@ -257,9 +257,10 @@ fn exactness(grid: &Grid) -> Option<String> {
     let mut text = format!("{} judged against the truth: ", count(judged.len() as u64, "run was", "runs were"));
     text += &match (culprits, worst) {
         (0, _) => "none lost a visible triangle.".into(),
-        (n, None) => format!("{n} lost visible triangles, none a sampled pixel."),
+        (n, None) => format!("{} lost visible triangles, none a sampled pixel.", count(n as u64, "run", "runs")),
         (n, Some((names, ppm))) => format!(
-            "{n} lost visible triangles; the worst is {} on {} with {} pixels per million.",
+            "{} lost visible triangles; the worst is {} on {} with {} pixels per million.",
+            count(n as u64, "run", "runs"),
             names.combination,
             names.place,
             format::number(ppm, 3)

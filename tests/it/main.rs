@@ -8,6 +8,7 @@ mod faults;
 mod generators;
 mod manifest;
 mod oracle;
+mod preflight;
 mod report;
 mod scenes;
 mod store;
