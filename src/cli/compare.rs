@@ -15,6 +15,7 @@ use std::process::ExitCode;
 pub struct Args {
     /// Name of a study, `name@series`, or its manifest
     pub first: String,
+    /// The study to set beside it, likewise
     pub second: String,
     /// Metric to compare; by default culling time, paired frame by frame
     #[arg(long, default_value = PAIRED)]

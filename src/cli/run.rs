@@ -213,7 +213,7 @@ fn announce(mode: Mode, manifest: &Manifest, matrix: &Matrix, s: &Submitted, ser
                 (matrix.excluded_runs.len() as u64, "excluded"),
             ];
             let parts: Vec<String> = parts.iter().filter(|p| p.0 > 0).map(|(n, what)| format!("{n} {what}")).collect();
-            eprintln!("{} runs: {}", s.runs, parts.join(", "));
+            eprintln!("{} {}: {}", s.runs, if s.runs == 1 { "run" } else { "runs" }, parts.join(", "));
         }
     }
 }
