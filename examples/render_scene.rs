@@ -1,6 +1,7 @@
 //! Renders a generated scene or a scene file (metres, `up z` unless said) to a PNG:
 //! `render_scene SPEC|FILE OUT.png [over AZIMUTH ELEVATION | plan | eye X Y Z YAW PITCH | walk FRAME] [cut HEIGHT] [up y] [scale S]`,
 //! degrees and metres. `walk` on its own with `plan` or `over` draws the way.
+//! Without arguments: the arena `gorge` to `target/scene.png`.
 
 use cullmark::math::{Camera, DVec3, Pose, Projection, View};
 use cullmark::preview::{Style, draw_line, overview, plan, render, write_png};
@@ -10,7 +11,10 @@ use cullmark::scene::{generate, load, walkthrough};
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let args: Vec<String> = std::env::args().skip(1).collect();
+    let mut args: Vec<String> = std::env::args().skip(1).collect();
+    if args.is_empty() {
+        args = vec!["arena:map=gorge".into(), "target/scene.png".into()];
+    }
     let [spec, out, rest @ ..] = &args[..] else {
         return Err("usage: render_scene SPEC OUT.png [over AZ EL | plan | eye X Y Z YAW PITCH | walk FRAME]".into());
     };

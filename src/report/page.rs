@@ -144,14 +144,26 @@ fn what_was_run(grid: &Grid) -> String {
     )
 }
 
+/// Below this a bootstrap over trials has too few values to draw from.
+const FEW_TRIALS: usize = 5;
+
 fn findings_html(content: &Content) -> String {
     let mut out = String::from("<ul class=\"findings\">\n");
     for finding in findings(content.grid, content.judged) {
         let _ = writeln!(out, "<li>{}</li>", html(&finding));
     }
-    out + "</ul>\n<p class=\"note\">Computed from the data below. Brackets: 95 % bootstrap interval over repeats. \
-           “Modelled” times are derived, not measured; † may lose visible triangles by design.</p>\n"
-        + &table(content, "best")
+    out += "</ul>\n<p class=\"note\">Computed from the data below. Brackets: 95 % bootstrap interval over repeats. \
+            “Modelled” times are derived, not measured; † may lose visible triangles by design.";
+    let done = content.grid.results.runs.iter().filter(|r| r.status == RunStatus::Done);
+    let fewest = done.map(|r| r.trials.len()).min().unwrap_or(0);
+    if (1..FEW_TRIALS).contains(&fewest) {
+        let _ = write!(
+            out,
+            " With {} a run the intervals span little more than what was seen: they say less than they seem to.",
+            super::format::count(fewest as u64, "repeat", "repeats")
+        );
+    }
+    out + "</p>\n" + &table(content, "best")
 }
 
 fn claims_html(content: &Content) -> String {
