@@ -1,5 +1,5 @@
 //! The plain types in which the two halves meet: what to run, and what came of it.
-//! Serde only; ids are stable content hashes (CONVENTIONS in `ARCHITECTURE.md`).
+//! Serde only; ids are stable content hashes (see `ARCHITECTURE.md`).
 
 use crate::culling::{Class, Removes};
 use crate::hierarchy::BuildStats;
@@ -118,7 +118,7 @@ pub struct TimeModel {
 }
 
 impl Default for TimeModel {
-    /// Least squares on eight rows of Serpa 2018-19 (ALGORITHMS E2.1).
+    /// Non-negative least squares on the eight rows of table 1 of Serpa (2018-19).
     fn default() -> Self {
         TimeModel { index_ns: 0.32, draw_call_ns: 430.0 }
     }

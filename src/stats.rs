@@ -1,6 +1,6 @@
 //! Medians, spreads and intervals. The unit that is resampled is the trial (one
 //! child process), never the frame: frames of one walk are autocorrelated, so
-//! an interval over them would be far too narrow (ALGORITHMS G4).
+//! an interval over them would be far too narrow.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
