@@ -45,7 +45,7 @@ fn read(folder: &Path, name: &str, file: &str, up: Up, scale: f64) -> cullmark::
 
 fn measure(name: &str, scene: &Scene, poses: &[Pose]) {
     for (width_px, height_px, samples) in [(960, 540, 2), (1920, 1080, 1)] {
-        let accuracy = Accuracy { frames: 6, width_px, height_px, samples };
+        let accuracy = Accuracy { frames: 6, width_px, height_px, samples, ..Accuracy::default() };
         let judged = oracle::judged_frames(poses.len() as u32, &accuracy);
         let times: Vec<f64> = judged
             .iter()

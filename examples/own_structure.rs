@@ -48,7 +48,7 @@ fn main() -> Result<()> {
     let (tests, _) = make_tests(&parse_sum("frustum")?)?;
     let (walk, _) = make_walk(&Spec::parse("flat")?)?;
     let mut setup = Setup::from_parts(scene, poses, &Camera::default(), &Slabs { width_m: 2.0 }, tests, walk)?;
-    let accuracy = Accuracy { frames: 5, width_px: 320, height_px: 180, samples: 1 };
+    let accuracy = Accuracy { frames: 5, width_px: 320, height_px: 180, samples: 1, ..Accuracy::default() };
     let truth = oracle::truth(&setup.scene, &Camera::default(), &setup.judged_poses(&accuracy), &accuracy);
     let judgement = setup.judge(&truth);
     for f in &judgement.frames {

@@ -41,7 +41,7 @@ impl Test for Radius {
 }
 
 fn main() -> Result<()> {
-    let accuracy = Accuracy { frames: 5, width_px: 320, height_px: 180, samples: 1 };
+    let accuracy = Accuracy { frames: 5, width_px: 320, height_px: 180, samples: 1, ..Accuracy::default() };
     for radius_m in [5.0, 20.0, 80.0] {
         let scene = generate::make(&Spec::parse("rooms:world=1")?)?.0.generate();
         let poses = walkthrough::generate::make(&Spec::parse("walk:frames=60")?)?.0.walk(&scene)?;

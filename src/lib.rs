@@ -44,6 +44,8 @@ pub mod results;
 #[cfg(feature = "service")]
 pub mod store;
 #[cfg(feature = "service")]
+pub mod sweep;
+#[cfg(feature = "service")]
 pub mod worker;
 
 pub use error::{Error, Result};

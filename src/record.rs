@@ -2,8 +2,9 @@
 //! Serde only; ids are stable content hashes (see `ARCHITECTURE.md`).
 
 use crate::culling::{Class, Removes};
+use crate::error::{Error, Result};
 use crate::hierarchy::BuildStats;
-use crate::math::Camera;
+use crate::math::{Arithmetic, Camera};
 use crate::registry::Spec;
 use crate::scene::LoadReport;
 use serde::{Deserialize, Serialize};
@@ -107,6 +108,24 @@ pub struct Accuracy {
     pub height_px: u32,
     /// s x s samples a pixel.
     pub samples: u32,
+    /// Rays aimed at every triangle of the exact set that no sample sees, to find a
+    /// witness that it is visible after all.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub witness_rays: u32,
+    /// Bracket V* from above: the oracle proves hidden what it can, with cells of
+    /// at least this many to a side of the image; 0 leaves frustum and facing alone.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub hiding_cells: u32,
+}
+
+impl Default for Accuracy {
+    fn default() -> Self {
+        Accuracy { frames: 10, width_px: 1920, height_px: 1080, samples: 1, witness_rays: 0, hiding_cells: 0 }
+    }
+}
+
+fn is_zero(x: &u32) -> bool {
+    *x == 0
 }
 
 /// Derived, always labelled as modelled:
@@ -189,6 +208,18 @@ impl RunSpec {
             &self.camera,
             &self.accuracy,
         ))
+    }
+
+    /// The arithmetic that tests take which name none: the axis' value, or the default.
+    ///
+    /// # Errors
+    /// If the axis holds no known name.
+    pub fn arithmetic(&self) -> Result<Arithmetic> {
+        let Some(spec) = self.axes.get(crate::math::arithmetic::NAME) else { return Ok(Arithmetic::default()) };
+        Arithmetic::named(&spec.kind).ok_or_else(|| {
+            Error::new(format!("there is no arithmetic `{}`", spec.kind))
+                .help(format!("known: {}", Arithmetic::NAMES.join(", ")))
+        })
     }
 
     pub fn culling_label(&self) -> String {
@@ -293,8 +324,25 @@ pub struct FrameErrors {
     pub submitted: u64,
     /// Entries submitted, replicated or split ones counted each.
     pub submitted_entries: u64,
-    /// |V_lo|: seen by a sample.
+    /// |V_lo|: seen by a sample or a witness ray.
     pub visible: u64,
+    /// |V_hi|: in the exact set of frustum and facing and not proved hidden.
+    #[serde(default)]
+    pub visible_hi: u64,
+    /// |S minus V_lo|: over-submission if V* is V_lo.
+    #[serde(default)]
+    pub submitted_unseen: u64,
+    /// |S minus V_hi|: over-submission that is proved.
+    #[serde(default)]
+    pub submitted_invisible: u64,
+    /// Members of `false_culls` that only a witness ray sees.
+    #[serde(default)]
+    pub false_culls_by_ray: u64,
+    /// Samples that see a triangle which was not submitted, and all samples.
+    #[serde(default)]
+    pub false_cull_samples: u64,
+    #[serde(default)]
+    pub samples: u64,
     /// Exact set the method is entitled to reduce to (frustum, facing).
     pub potential: u64,
     /// |V_lo minus S|: proved false culls that a sample sees.

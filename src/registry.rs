@@ -112,7 +112,7 @@ impl Spec {
             };
             out.params.insert(key.clone(), param.check(value)?);
         }
-        for param in params {
+        for param in params.iter().filter(|p| !matches!(p.default, Default::Axis(_))) {
             out.params.entry(param.name.to_string()).or_insert_with(|| param.default.value());
         }
         Ok(out)
@@ -224,6 +224,9 @@ pub enum Default {
     Bool(bool),
     /// The first choice is the default.
     Choice(&'static [&'static str]),
+    /// One of these names. Not given, it is taken from the axis of the same name,
+    /// and [`Spec::resolve`] leaves it out.
+    Axis(&'static [&'static str]),
 }
 
 impl Default {
@@ -233,6 +236,7 @@ impl Default {
             Default::Float { value, .. } => Value::Float(*value),
             Default::Bool(b) => Value::Bool(*b),
             Default::Choice(c) => Value::Text(c[0].to_string()),
+            Default::Axis(_) => Value::Text("the axis' value".to_string()),
         }
     }
 }
@@ -252,8 +256,10 @@ impl Param {
             (Default::Bool(_), Value::Bool(_)) => Ok(value.clone()),
             (Default::Bool(_), _) => wrong("true or false".to_string()),
             // By its printed form, so that a choice may be a number: `sectors=8`.
-            (Default::Choice(c), _) if c.contains(&value.to_string().as_str()) => Ok(Value::Text(value.to_string())),
-            (Default::Choice(c), _) => {
+            (Default::Choice(c) | Default::Axis(c), _) if c.contains(&value.to_string().as_str()) => {
+                Ok(Value::Text(value.to_string()))
+            }
+            (Default::Choice(c) | Default::Axis(c), _) => {
                 let list = c.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
                 let near = did_you_mean(&value.to_string(), c.iter().copied());
                 let mut e = Error::new(format!("is {value}, but must be one of {list}")).key(name);

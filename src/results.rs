@@ -3,6 +3,7 @@
 
 use crate::culling::Class;
 use crate::record::{Environment, FrameErrors, RunSpec};
+use crate::sweep::Sweep;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -19,6 +20,9 @@ pub struct StudyResults {
     pub environments: BTreeMap<String, Environment>,
     /// Frames a point when curves are consolidated.
     pub consolidate_frames: u32,
+    /// Charts of an error against a stressor that the manifest asks for.
+    #[serde(default)]
+    pub sweeps: Vec<Sweep>,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -61,7 +61,7 @@ impl Setup {
             return Err(Error::new(format!("path `{}` has no frames", spec.path.name)));
         }
         let (structure, _) = structure::make(&spec.structure)?;
-        let (tests, _) = culling::make_tests(&spec.culling)?;
+        let (tests, _) = culling::make_tests_in(&spec.culling, spec.arithmetic()?)?;
         let (walk, _) = culling::make_walk(&spec.walk)?;
         let setup = Setup::from_parts(scene, poses, &spec.camera, structure.as_ref(), tests, walk)?;
         Ok(Setup { load_ns, ..setup })
@@ -116,11 +116,7 @@ impl Setup {
     #[inline]
     pub fn cull(&mut self, frame: usize, out: &mut DrawList, tally: &mut Tally) {
         let view = &self.views[frame];
-        out.clear();
-        for test in &mut self.tests {
-            test.begin(view, &self.hierarchy);
-        }
-        self.walk.run(view, &self.hierarchy, &mut self.tests, out, tally);
+        culling::cull(view, &self.hierarchy, &mut self.tests, self.walk.as_mut(), out, tally);
     }
 
     /// One whole pass without a clock: the work of every frame.
@@ -150,7 +146,7 @@ impl Setup {
                     triangles,
                     entries,
                     draw_calls: list.draw_calls(&self.hierarchy),
-                    draw_calls_any_material: list.ranges.len() as u64,
+                    draw_calls_any_material: list.draw_calls_any_material(),
                     hash: hash_ranges(&list),
                 }
             })

@@ -1,5 +1,6 @@
-//! Culling: a [`Test`] judges blocks of 8 siblings, a [`Walk`] owns order and
-//! temporal state. The manifest composes them; neither knows any structure.
+//! Culling: a [`Test`] judges blocks of 8 siblings, or single triangles of what is
+//! left, or both; a [`Walk`] owns order and temporal state. The manifest composes
+//! them; neither knows any structure.
 
 pub mod depth_first;
 mod descent;
@@ -17,8 +18,8 @@ mod prefetch_x86;
 
 use crate::error::Result;
 use crate::hierarchy::Hierarchy;
-use crate::math::View;
-use crate::registry::{Entry, Spec, find};
+use crate::math::{Arithmetic, View, arithmetic};
+use crate::registry::{Default as Allowed, Entry, Param, Spec, Value, find};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 
@@ -91,6 +92,32 @@ pub trait Test: Send {
     fn judge_flat(&mut self, hierarchy: &Hierarchy, outside: &mut [u8], tally: &mut Tally) {
         judge_flat_by_block(self, hierarchy, outside, tally);
     }
+    /// Judges single triangles after the walk: takes out of `list` what it is
+    /// entitled to remove ([`DrawList::retain`]). A test of nodes alone leaves it.
+    fn filter(&mut self, hierarchy: &Hierarchy, list: &mut DrawList, tally: &mut Tally) {
+        let _ = (hierarchy, list, tally);
+    }
+}
+
+/// One frame: tests begin, the walk visits nodes, tests of triangles go through
+/// what is left.
+#[inline]
+pub fn cull(
+    view: &View,
+    hierarchy: &Hierarchy,
+    tests: &mut [Box<dyn Test>],
+    walk: &mut dyn Walk,
+    out: &mut DrawList,
+    tally: &mut Tally,
+) {
+    out.clear();
+    for test in tests.iter_mut() {
+        test.begin(view, hierarchy);
+    }
+    walk.run(view, hierarchy, tests, out, tally);
+    for test in tests.iter_mut() {
+        test.filter(hierarchy, out, tally);
+    }
 }
 
 /// [`Test::judge_flat`] by way of [`Test::judge`].
@@ -130,11 +157,30 @@ pub trait Walk: Send {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct DrawList {
     pub ranges: Vec<(u32, u32)>,
+    /// Triangles were judged one by one, so what is drawn is an index list written
+    /// anew this frame: ranges of one material follow each other in it without a gap.
+    pub compacted: bool,
+    spare: Vec<(u32, u32)>,
 }
 
 impl DrawList {
     pub fn clear(&mut self) {
         self.ranges.clear();
+        self.compacted = false;
+    }
+
+    /// Keeps the positions that `keep` says yes to and marks the list as compacted.
+    #[inline]
+    pub fn retain(&mut self, mut keep: impl FnMut(u32) -> bool) {
+        let before = std::mem::replace(&mut self.ranges, std::mem::take(&mut self.spare));
+        self.ranges.clear();
+        for (first, end) in &before {
+            for position in (*first..*end).filter(|p| keep(*p)) {
+                self.push(position, position + 1);
+            }
+        }
+        self.spare = before;
+        self.compacted = true;
     }
 
     #[inline]
@@ -157,9 +203,22 @@ impl DrawList {
         self.ranges.iter().flat_map(|(a, b)| *a..*b)
     }
 
-    /// Draw calls: one a material run of each range.
+    /// Draw calls: one a material run of each range; of a compacted list, one a
+    /// material run that is touched at all.
     pub fn draw_calls(&self, hierarchy: &Hierarchy) -> u64 {
-        self.ranges.iter().map(|(a, b)| u64::from(hierarchy.material_runs(*a, *b))).sum()
+        let runs = |(a, b): &(u32, u32)| u64::from(hierarchy.material_runs(*a, *b));
+        let whole: u64 = self.ranges.iter().map(runs).sum();
+        if !self.compacted {
+            return whole;
+        }
+        let run = |position: u32| hierarchy.material_run[position as usize];
+        let shared = self.ranges.windows(2).filter(|w| run(w[0].1 - 1) == run(w[1].0)).count();
+        whole - shared as u64
+    }
+
+    /// Draw calls if all triangles had one material.
+    pub fn draw_calls_any_material(&self) -> u64 {
+        if self.compacted { u64::from(!self.ranges.is_empty()) } else { self.ranges.len() as u64 }
     }
 }
 
@@ -174,16 +233,27 @@ pub struct Tally {
     pub plane_tests: u64,
     /// Normal or octant masks compared.
     pub mask_tests: u64,
+    /// Triangles judged one by one.
+    pub triangle_tests: u64,
+    /// Signs asked of a `filtered` predicate, and those that single precision, then
+    /// double precision too, could not tell.
+    pub predicates: u64,
+    pub fallbacks_f64: u64,
+    pub fallbacks_exact: u64,
 }
 
 impl Tally {
     /// Name, unit and value of every counter: counters are data.
-    pub fn named(&self) -> [(&'static str, &'static str, u64); 4] {
+    pub fn named(&self) -> [(&'static str, &'static str, u64); 8] {
         [
             ("nodes_visited", "nodes", self.nodes_visited),
             ("lane_tests", "lanes", self.lane_tests),
             ("plane_tests", "planes", self.plane_tests),
             ("mask_tests", "masks", self.mask_tests),
+            ("triangle_tests", "triangles", self.triangle_tests),
+            ("predicates", "signs", self.predicates),
+            ("fallbacks_f64", "signs", self.fallbacks_f64),
+            ("fallbacks_exact", "signs", self.fallbacks_exact),
         ]
     }
 }
@@ -199,14 +269,45 @@ pub type Sum = (Vec<Box<dyn Test>>, Vec<Spec>);
 
 /// The tests that `specs` name, in order, with defaults filled in.
 pub fn make_tests(specs: &[Spec]) -> Result<Sum> {
+    make_tests_in(specs, Arithmetic::default())
+}
+
+/// The same; a test that knows arithmetics and names none takes `arithmetic`. The
+/// resolved specs name it only where the given ones do.
+pub fn make_tests_in(specs: &[Spec], arithmetic: Arithmetic) -> Result<Sum> {
     let mut tests = Vec::new();
     let mut resolved = Vec::new();
     for spec in specs {
         let (entry, spec) = find("culling test", TESTS, spec)?;
-        tests.push((entry.make)(&spec));
+        let mut own = spec.clone();
+        if knows_arithmetic(&spec.kind) && !own.params.contains_key(arithmetic::NAME) {
+            own.params.insert(arithmetic::NAME.to_string(), Value::Text(arithmetic.name().to_string()));
+        }
+        tests.push((entry.make)(&own));
         resolved.push(spec);
     }
     Ok((tests, resolved))
+}
+
+/// Whether the test `kind` is evaluated in the arithmetic of the axis.
+pub fn knows_arithmetic(kind: &str) -> bool {
+    let entry = TESTS.iter().find(|e| e.name == kind);
+    entry.is_some_and(|e| e.params.iter().any(|p| p.name == arithmetic::NAME))
+}
+
+/// The parameter of tests that know arithmetics.
+pub const ARITHMETIC: Param = Param {
+    name: arithmetic::NAME,
+    default: Allowed::Axis(Arithmetic::NAMES),
+    about: "numbers in which it is evaluated; by default what the axis `arithmetic` says",
+};
+
+/// The arithmetic of a spec that a constructor gets.
+pub fn arithmetic_of(spec: &Spec) -> Arithmetic {
+    match spec.params.get(arithmetic::NAME) {
+        Some(Value::Text(name)) => Arithmetic::named(name).expect("a resolved spec names a known arithmetic"),
+        _ => Arithmetic::default(),
+    }
 }
 
 pub fn make_walk(spec: &Spec) -> Result<(Box<dyn Walk>, Spec)> {

@@ -134,7 +134,7 @@ pub fn measure(top: &mut Fields) -> (RepeatPolicy, Timing) {
 }
 
 pub fn accuracy(top: &mut Fields) -> Accuracy {
-    let mut accuracy = Accuracy { frames: 10, width_px: 1920, height_px: 1080, samples: 1 };
+    let mut accuracy = Accuracy::default();
     let Some(mut f) = top.table("accuracy") else { return accuracy };
     accuracy.frames = f.u32("frames", 0..=1_000_000).unwrap_or(accuracy.frames);
     accuracy.width_px = f.u32("width_px", 1..=16_384).unwrap_or(accuracy.width_px);

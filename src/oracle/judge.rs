@@ -113,7 +113,9 @@ pub fn losses(scene: &Scene, view: &View, truth: &FrameTruth, submitted: &Submit
         covered_pixels: truth.covered_pixels,
         pixels: u64::from(truth.grid.width_px) * u64::from(truth.grid.height_px),
         largest_blob_px: image.largest_blob(),
+        visible_hi: standings.iter().filter(|s| s.drawable()).count() as u64,
         lost_ids: named.map(|t| scene.source_triangle_id[*t as usize]).collect(),
+        ..FrameErrors::default()
     };
     Losses { errors, seen, hidden }
 }

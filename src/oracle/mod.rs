@@ -164,7 +164,9 @@ mod tests {
 
     #[test]
     fn judged_frames_are_even_and_hold_both_ends() {
-        let judged = |count, frames| judged_frames(count, &Accuracy { frames, width_px: 8, height_px: 8, samples: 1 });
+        let judged = |count, frames| {
+            judged_frames(count, &Accuracy { frames, width_px: 8, height_px: 8, samples: 1, ..Accuracy::default() })
+        };
         assert_eq!(judged(2000, 5), [0, 500, 1000, 1499, 1999]);
         assert_eq!(judged(3, 24), [0, 1, 2]);
         assert_eq!(judged(10, 1), [0]);

@@ -155,6 +155,7 @@ impl Store {
                 .await
                 .map_err(explain)?;
         Ok(StudyResults {
+            sweeps: Vec::new(),
             name: study.name,
             title: study.title,
             manifest_toml: study.manifest_toml,

@@ -17,7 +17,7 @@ use cullmark::scene::Scene;
 use std::collections::HashSet;
 
 fn accuracy(width_px: u32, height_px: u32, samples: u32) -> Accuracy {
-    Accuracy { frames: 4, width_px, height_px, samples }
+    Accuracy { frames: 4, width_px, height_px, samples, ..Accuracy::default() }
 }
 
 fn cameras() -> [Camera; 3] {

@@ -60,7 +60,7 @@ fn spec(scene: &str, structure: &str, culling: &str) -> RunSpec {
         walk: Spec::new("depth_first"),
         axes: BTreeMap::new(),
         revisions: BTreeMap::new(),
-        accuracy: Accuracy { frames: 20, width_px: 1920, height_px: 1080, samples: 2 },
+        accuracy: Accuracy { frames: 20, width_px: 1920, height_px: 1080, samples: 2, ..Accuracy::default() },
         protocol: Protocol {
             passes: 3,
             warmup_passes: 1,
@@ -151,6 +151,7 @@ pub fn run(
                 pixels: 1920 * 1080,
                 largest_blob_px: 12 * false_culls,
                 lost_ids: vec![],
+                ..FrameErrors::default()
             }
         })
         .collect();
@@ -239,6 +240,7 @@ pub fn sized(scenes: &[(&str, f64)], frames: usize, trials: u32) -> StudyResults
         (last.noisy, last.noise) = (true, 1.31);
     }
     StudyResults {
+        sweeps: Vec::new(),
         name: "serpa-2014".into(),
         title: "Octree and BSP under frustum and normal-mask culling".into(),
         manifest_toml:

@@ -36,7 +36,7 @@ pub(super) fn spec(scene: &str, depth: i64) -> RunSpec {
         walk: Spec::new("depth_first"),
         axes: Default::default(),
         revisions: Default::default(),
-        accuracy: Accuracy { frames: 2, width_px: 64, height_px: 36, samples: 1 },
+        accuracy: Accuracy { frames: 2, width_px: 64, height_px: 36, samples: 1, ..Accuracy::default() },
         protocol: Protocol {
             passes: 2,
             warmup_passes: 1,
