@@ -7,7 +7,8 @@ use crate::registry::{Spec, Value};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A published statement about a ratio of two selections of runs.
+/// A published statement about a ratio of two selections of runs, or about the
+/// metric of one.
 ///
 /// In every group (see [`Claim::for_each`]) the ratio is
 /// `metric(numerator) / metric(denominator)`, runs paired by all axes that
@@ -22,6 +23,8 @@ pub struct Claim {
     /// One of [`METRICS`].
     pub metric: String,
     pub numerator: Selection,
+    /// Empty where the relation is about the metric itself ([`Relation::is_own`]).
+    #[serde(default)]
     pub denominator: Selection,
     pub relation: Relation,
     /// What the source printed for the ratio, low and high (equal for one value).
@@ -51,12 +54,30 @@ pub enum Relation {
     /// correlation above 0).
     #[serde(rename = "grows")]
     Grows,
+    /// The metric itself is 0 in every run of the numerator.
+    #[serde(rename = "zero")]
+    Zero,
+    /// The metric itself, its mean over the numerator's runs of a group, is inside the
+    /// published range, widened by the tolerance.
+    #[serde(rename = "value")]
+    Value,
 }
 
 impl Relation {
     /// Spelling in a manifest.
-    pub const ALL: &[(&str, Relation)] =
-        &[("<", Relation::Less), (">", Relation::Greater), ("ratio", Relation::Ratio), ("grows", Relation::Grows)];
+    pub const ALL: &[(&str, Relation)] = &[
+        ("<", Relation::Less),
+        (">", Relation::Greater),
+        ("ratio", Relation::Ratio),
+        ("grows", Relation::Grows),
+        ("zero", Relation::Zero),
+        ("value", Relation::Value),
+    ];
+
+    /// About the metric of the numerator alone, not about a ratio.
+    pub fn is_own(self) -> bool {
+        matches!(self, Relation::Zero | Relation::Value)
+    }
 
     pub fn as_str(self) -> &'static str {
         Self::ALL.iter().find(|(_, r)| *r == self).map_or("", |(s, _)| s)

@@ -37,19 +37,36 @@ fn claim(mut f: Fields, id: Option<String>, names: &Names) -> Option<Claim> {
     let source = f.sentence("source", "name paper and figure, such as \"Serpa & Rodrigues 2014, fig. 3\"");
     let metric = metric(&mut f);
     let numerator = selection(&mut f, "numerator", names);
-    let denominator = selection(&mut f, "denominator", names);
     if !f.has("relation") {
-        f.missing("relation", "what is stated of numerator / denominator: \"<\", \">\", \"ratio\" or \"grows\"");
+        f.missing(
+            "relation",
+            "what is stated of numerator / denominator: \"<\", \">\", \"ratio\" or \"grows\"; of the numerator alone: \"zero\" or \"value\"",
+        );
     }
     let relation = f.choice("relation", Relation::ALL);
+    let denominator = match relation {
+        Some(own) if own.is_own() => {
+            if let Some(node) = f.get("denominator") {
+                let e =
+                    Error::new(format!("stands beside relation = \"{}\", which is about one selection", own.as_str()));
+                f.note(&node.place, "denominator", e.help("remove it, or state a ratio: \"<\", \">\" or \"ratio\""));
+            }
+            Some(Selection::new())
+        }
+        _ => selection(&mut f, "denominator", names),
+    };
     let for_each = for_each(&mut f);
     let (published, published_for) = published(&mut f, for_each.as_deref(), names);
     let tolerance = f.number("tolerance", "a share from 0 to 10, such as 0.25", |x| (0.0..=10.0).contains(&x));
     let nothing_published = published.is_none() && published_for.is_empty();
-    if relation == Some(Relation::Ratio) && nothing_published && !f.has("published") {
+    if let Some(stated @ (Relation::Ratio | Relation::Value)) = relation
+        && nothing_published
+        && !f.has("published")
+    {
+        let word = stated.as_str();
         f.missing(
             "published",
-            "relation = \"ratio\" needs the published ratio: 3.35, [1.71, 1.79] or { nucleus = 3.5 }",
+            &format!("relation = \"{word}\" needs the published {word}: 3.35, [1.71, 1.79] or {{ nucleus = 3.5 }}"),
         );
     }
     if relation == Some(Relation::Grows)

@@ -1,7 +1,7 @@
 //! Verdicts on published claims: four outcomes, place by place.
 
-use super::labels;
 use super::metrics::{self, Kind, Metric};
+use super::{labels, own_value};
 use crate::claim::{Claim, Relation, axis_value, selects};
 use crate::registry::format_sum;
 use crate::results::{RunResult, RunStatus, StudyResults};
@@ -65,12 +65,13 @@ pub fn judge_all<'a>(results: &StudyResults, claims: &'a [Claim]) -> Vec<Judged<
 }
 
 pub fn judge<'a>(results: &StudyResults, claim: &'a Claim) -> Judged<'a> {
-    let groups = groups(results, claim);
     let (measured, modelled) = twins(&claim.metric);
-    let mut out: Vec<Group> = if claim.relation == Relation::Grows {
-        grows(claim, &groups, measured, modelled)
+    let mut out: Vec<Group> = if claim.relation.is_own() {
+        own_value::groups(results, claim)
+    } else if claim.relation == Relation::Grows {
+        grows(claim, &groups(results, claim), measured, modelled)
     } else {
-        groups.iter().filter_map(|g| in_group(claim, g, measured, modelled)).collect()
+        groups(results, claim).iter().filter_map(|g| in_group(claim, g, measured, modelled)).collect()
     };
     if out.is_empty() {
         out.push(Group {
@@ -79,7 +80,10 @@ pub fn judge<'a>(results: &StudyResults, claim: &'a Claim) -> Judged<'a> {
             verdict: Verdict::Undecided,
             ratio: None,
             model_ratio: None,
-            note: "the study has no pair of runs that the claim speaks of".into(),
+            note: match claim.relation.is_own() {
+                true => "the study has no run that the claim speaks of".into(),
+                false => "the study has no pair of runs that the claim speaks of".into(),
+            },
         });
     }
     let verdict = overall(&out);
@@ -130,13 +134,7 @@ fn groups<'a>(results: &'a StudyResults, claim: &Claim) -> Vec<Pairs<'a>> {
     }
     let mut groups: Vec<Pairs> = Vec::new();
     for a in results.runs.iter().filter(|r| selects(&claim.numerator, &r.spec)) {
-        let name = match claim.for_each.as_deref() {
-            None => "everywhere".to_string(),
-            Some("scene") => labels::place(results, a),
-            Some("culling") => a.culling.clone(),
-            Some("structure") => a.structure.clone(),
-            Some(axis) => format_sum(&axis_value(&a.spec, axis)),
-        };
+        let name = group_name(results, claim, a);
         for b in partners.get(&free(a)).into_iter().flatten().copied() {
             let group = match groups.iter_mut().position(|g| g.name == name) {
                 Some(i) => &mut groups[i],
@@ -150,6 +148,17 @@ fn groups<'a>(results: &'a StudyResults, claim: &Claim) -> Vec<Pairs<'a>> {
         }
     }
     groups
+}
+
+/// Name of the group that `run` belongs to.
+pub(super) fn group_name(results: &StudyResults, claim: &Claim, run: &RunResult) -> String {
+    match claim.for_each.as_deref() {
+        None => "everywhere".to_string(),
+        Some("scene") => labels::place(results, run),
+        Some("culling") => run.culling.clone(),
+        Some("structure") => run.structure.clone(),
+        Some(axis) => format_sum(&axis_value(&run.spec, axis)),
+    }
 }
 
 /// Values of the pairs: (numerator trials, denominator trials); or why there are none.
@@ -200,7 +209,8 @@ pub fn decide(relation: Relation, published: Option<[f64; 2]>, tolerance: f64, (
         Relation::Less => (f64::NEG_INFINITY, 1.0),
         Relation::Greater => (1.0, f64::INFINITY),
         Relation::Grows => (0.0, f64::INFINITY),
-        Relation::Ratio => match published {
+        Relation::Zero => (0.0, 0.0),
+        Relation::Ratio | Relation::Value => match published {
             Some([a, b]) => (a * (1.0 - tolerance), b * (1.0 + tolerance)),
             None => return Verdict::Undecided,
         },
@@ -209,7 +219,7 @@ pub fn decide(relation: Relation, published: Option<[f64; 2]>, tolerance: f64, (
         return Verdict::Undecided;
     }
     // A published range includes its ends; "below", "above" and "grows" do not.
-    let closed = relation == Relation::Ratio;
+    let closed = matches!(relation, Relation::Ratio | Relation::Value | Relation::Zero);
     let inside = |x: f64| if closed { from <= x && x <= to } else { from < x && x < to };
     if inside(low) && inside(high) {
         Verdict::Reproduced
@@ -267,7 +277,7 @@ fn in_group(claim: &Claim, group: &Pairs, measured: Option<&Metric>, modelled: O
     Some(Group { name: group.name.clone(), stated: stated(claim, published), verdict, ratio, model_ratio, note })
 }
 
-fn stated(claim: &Claim, published: Option<[f64; 2]>) -> String {
+pub(super) fn stated(claim: &Claim, published: Option<[f64; 2]>) -> String {
     let number = |x| super::format::number(x, 3);
     let range = published.map(|[a, b]| if a == b { number(a) } else { format!("{} to {}", number(a), number(b)) });
     match (claim.relation, range) {
@@ -275,7 +285,10 @@ fn stated(claim: &Claim, published: Option<[f64; 2]>) -> String {
         (Relation::Less, Some(r)) => format!("below 1 (published {r})"),
         (Relation::Greater, None) => "above 1".into(),
         (Relation::Greater, Some(r)) => format!("above 1 (published {r})"),
-        (Relation::Ratio, r) => format!("{} ± {} %", r.unwrap_or_default(), number(100.0 * claim.tolerance)),
+        (Relation::Zero, _) => format!("{} is 0", claim.metric),
+        (Relation::Ratio | Relation::Value, r) => {
+            format!("{} ± {} %", r.unwrap_or_default(), number(100.0 * claim.tolerance))
+        }
         (Relation::Grows, _) => "grows with triangles".into(),
     }
 }

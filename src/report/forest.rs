@@ -23,6 +23,8 @@ fn colour(verdict: Verdict) -> Colour {
 pub fn draw(judged: &[Judged]) -> Option<Figure> {
     let shown: Vec<&Judged> = judged
         .iter()
+        // Values of other metrics have no place on an axis of ratios.
+        .filter(|j| !j.claim.relation.is_own())
         .filter(|j| j.groups.iter().any(|g| g.name != "trend" && (g.ratio.is_some() || g.model_ratio.is_some())))
         .collect();
     let groups = || shown.iter().flat_map(|j| j.groups.iter().map(move |g| (j, g))).filter(|(_, g)| g.name != "trend");

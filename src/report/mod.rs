@@ -22,6 +22,7 @@ pub mod forest;
 pub mod format;
 pub mod labels;
 pub mod metrics;
+mod own_value;
 pub mod page;
 pub mod pareto;
 pub mod query;

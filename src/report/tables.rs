@@ -217,8 +217,8 @@ pub fn scenes(results: &StudyResults) -> Table {
 }
 
 pub fn claims(judged: &[Judged]) -> Table {
-    let ratio = column("ratio", "", "measured ratio with its 95 % interval").with_interval();
-    let model = column("ratio, modelled", "", "the same with modelled frame time").with_interval();
+    let ratio = column("found", "", "measured ratio, or the metric itself, with its 95 % interval").with_interval();
+    let model = column("found, modelled", "", "the same with modelled frame time").with_interval();
     let columns = vec![
         Column::text("claim"),
         Column::text("where"),
@@ -242,7 +242,9 @@ pub fn claims(judged: &[Judged]) -> Table {
             ]);
         }
     }
-    table.caption = "Ratios of medians over trials; brackets: 95 % bootstrap interval.".into();
+    table.caption = "Ratios of medians over trials; where the statement is about a metric itself, its largest value \
+                     (stated as 0) or its mean over the runs. Brackets: 95 % bootstrap interval."
+        .into();
     table
 }
 

@@ -2,6 +2,8 @@
 
 #[path = "report/fixture.rs"]
 mod fixture;
+#[path = "report/own_values.rs"]
+mod own_values;
 #[path = "report/xml.rs"]
 mod xml;
 

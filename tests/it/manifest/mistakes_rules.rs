@@ -135,6 +135,15 @@ fn mistakes_in_claims_name_place_and_remedy() {
                 "[matrix]",
             ),
             (own(format!("{metric}{num}{den}relation = \"ratio\"")), 15, 1, "claim.0.published", "is missing", "3.35"),
+            (own(format!("{metric}{num}relation = \"value\"")), 15, 1, "claim.0.published", "is missing", "3.35"),
+            (
+                own(format!("{metric}{num}{den}relation = \"zero\"")),
+                21,
+                15,
+                "claim.0.denominator",
+                "about one selection",
+                "remove it",
+            ),
             (
                 own(format!("{metric}{num}{den}relation = \"ratio\"\npublished = [4, 3]")),
                 23,
