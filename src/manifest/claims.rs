@@ -66,7 +66,7 @@ fn claim(mut f: Fields, id: Option<String>, names: &Names) -> Option<Claim> {
         let word = stated.as_str();
         f.missing(
             "published",
-            &format!("relation = \"{word}\" needs the published {word}: 3.35, [1.71, 1.79] or {{ nucleus = 3.5 }}"),
+            format!("relation = \"{word}\" needs the published {word}: 3.35, [1.71, 1.79] or {{ nucleus = 3.5 }}"),
         );
     }
     if relation == Some(Relation::Grows)
