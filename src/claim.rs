@@ -2,6 +2,7 @@
 //! writes and the report judges. Plain types, no I/O.
 
 use crate::error::{Error, Result};
+use crate::math::{Arithmetic, arithmetic};
 use crate::record::RunSpec;
 use crate::registry::{Spec, Value};
 use serde::{Deserialize, Serialize};
@@ -143,6 +144,8 @@ pub fn axis_value(run: &RunSpec, axis: &str) -> Vec<Spec> {
         "structure" => vec![run.structure.clone()],
         "culling" => run.culling.clone(),
         "walk" => vec![run.walk.clone()],
+        // Not stored where it is the default, so that ids stay what they were before the axis.
+        arithmetic::NAME if !run.axes.contains_key(axis) => vec![Spec::new(Arithmetic::default().name())],
         other => run.axes.get(other).cloned().into_iter().collect(),
     }
 }

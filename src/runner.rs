@@ -119,6 +119,14 @@ impl Setup {
         culling::cull(view, &self.hierarchy, &mut self.tests, self.walk.as_mut(), out, tally);
     }
 
+    /// Whether every test could compute what it had to.
+    ///
+    /// # Errors
+    /// The first test's reason, if one could not.
+    pub fn check(&self) -> Result<()> {
+        self.tests.iter().find_map(|t| t.failure()).map_or(Ok(()), |why| Err(Error::new(why)))
+    }
+
     /// One whole pass without a clock: the work of every frame.
     pub fn count_pass(&mut self, mut each: impl FnMut(&Setup, usize, &DrawList)) -> Vec<FrameWork> {
         self.reset();
@@ -207,6 +215,7 @@ pub fn time_trial(spec: &RunSpec, cache: &Path) -> Result<TrialRecord> {
     let before_ns = machine::sentinel_ns();
     let work = setup.count_pass(|_, _, _| ());
     let frames = setup.views.len();
+    setup.check()?;
     let mut list = DrawList::default();
     let mut passes_ns = Vec::new();
     let mut switches = 0;
@@ -309,7 +318,9 @@ pub fn judge(spec: &RunSpec, cache: &Path) -> Result<Judgement> {
     let mut setup = Setup::new(spec, cache)?;
     let poses = setup.judged_poses(&spec.accuracy);
     let truth = oracle::truth_cached(&setup.scene, &spec.camera, &poses, &spec.accuracy, cache, &spec.truth_id())?;
-    Ok(setup.judge(&truth))
+    let judgement = setup.judge(&truth);
+    setup.check()?;
+    Ok(judgement)
 }
 
 /// The submitted set in the oracle's terms, which know no hierarchy.

@@ -11,9 +11,13 @@
 //! What we changed: 8 siblings at once (16 in a list), and a proved guard in place
 //! of an epsilon (`frustum_planes`), so the class is conservative for the scene in
 //! f64 at any distance from the origin. Boxes with NaN or infinite bounds are kept.
+//! The other arithmetics: `frustum_world` (aggressive), `frustum_double`, `frustum_fixed`.
 
+use super::frustum_double::{DoublePlanes, Level};
+use super::frustum_fixed::FixedPlanes;
 use super::frustum_planes::{FramePlanes, PlaneMasks, Work};
 use super::frustum_volume::Volume;
+use super::frustum_world::WorldPlanes;
 use super::*;
 use crate::hierarchy::{BoundsBlock, HalfSpace, LANES, NONE};
 use crate::registry::{Default as Allowed, Param};
@@ -23,6 +27,7 @@ pub const ENTRY: Entry<dyn Test> = Entry {
     about: "boxes against the view frustum, f32 relative to the camera with a proved error bound",
     revision: 1,
     params: &[
+        ARITHMETIC,
         Param {
             name: "last_plane",
             default: Allowed::Bool(false),
@@ -40,12 +45,14 @@ pub const ENTRY: Entry<dyn Test> = Entry {
         },
     ],
     make: |spec| {
-        Box::new(Frustum::new(
+        let mut test = Frustum::new(
             NodeTest::named(spec.text("node_test")),
             spec.bool("plane_mask"),
             spec.bool("last_plane"),
             kernels()[0],
-        ))
+        );
+        test.numbers = Numbers::new(arithmetic_of(spec));
+        Box::new(test)
     },
 };
 
@@ -97,6 +104,38 @@ pub fn kernels() -> Vec<Kernels> {
     found
 }
 
+/// Planes and columns of an arithmetic other than the wide kernels' own.
+enum Numbers {
+    /// Guarded single precision: the kernels.
+    Single,
+    World {
+        planes: WorldPlanes,
+        boxes: Vec<BoundsBlock>,
+    },
+    Double {
+        level: Level,
+        planes: DoublePlanes,
+    },
+    Fixed {
+        planes: FixedPlanes,
+        unfit: u64,
+    },
+}
+
+impl Numbers {
+    fn new(arithmetic: Arithmetic) -> Numbers {
+        let double = |level| Numbers::Double { level, planes: DoublePlanes::default() };
+        match arithmetic {
+            Arithmetic::F32Relative => Numbers::Single,
+            Arithmetic::F32World => Numbers::World { planes: WorldPlanes::default(), boxes: Vec::new() },
+            Arithmetic::F64 => double(Level::F64),
+            Arithmetic::Filtered => double(Level::Filtered),
+            Arithmetic::Exact => double(Level::Exact),
+            Arithmetic::FixedQ16 => Numbers::Fixed { planes: FixedPlanes::default(), unfit: 0 },
+        }
+    }
+}
+
 /// Carry while only half-spaces are tested: they never prove "wholly inside".
 const HALF_SPACE: u8 = 0x80;
 
@@ -107,6 +146,7 @@ pub struct Frustum {
     plane_mask: bool,
     last_plane: bool,
     kernels: Kernels,
+    numbers: Numbers,
     frame: FramePlanes,
     volume: Volume,
     /// This frame tests half-spaces, boxes.
@@ -123,6 +163,7 @@ impl Frustum {
             plane_mask,
             last_plane,
             kernels,
+            numbers: Numbers::Single,
             frame: FramePlanes::default(),
             volume: Volume::default(),
             with_planes: false,
@@ -132,17 +173,42 @@ impl Frustum {
         }
     }
 
+    /// What the `wanted` planes say of the `lanes` of a block.
+    #[inline]
+    fn ask(
+        &mut self,
+        bounds: &BoundsBlock,
+        block: usize,
+        wanted: u8,
+        lanes: u8,
+        want_inside: bool,
+        masks: &mut PlaneMasks,
+        tally: &mut Tally,
+    ) {
+        match &mut self.numbers {
+            Numbers::Single => (self.kernels.block)(&self.frame, bounds, wanted, want_inside, masks),
+            Numbers::World { planes, boxes } => planes.block(&boxes[block], wanted, masks),
+            Numbers::Double { level, planes } => {
+                planes.block(*level, &self.frame, bounds, wanted, lanes, masks, tally);
+            }
+            Numbers::Fixed { planes, unfit } => {
+                *unfit += u64::from(planes.block(bounds, wanted, lanes, masks).count_ones());
+            }
+        }
+    }
+
     /// Lanes of `alive` that no plane of `wanted` rejects, in index order.
     fn in_order(
-        &self,
+        &mut self,
         bounds: &BoundsBlock,
+        block: usize,
         wanted: u8,
         alive: u8,
         want_inside: bool,
         masks: &mut PlaneMasks,
         tally: &mut Tally,
     ) -> u8 {
-        (self.kernels.block)(&self.frame, bounds, wanted, want_inside, masks);
+        self.ask(bounds, block, wanted, alive, want_inside, masks, tally);
         let mut alive = alive;
         for k in bits(wanted) {
             tally.plane_tests += u64::from(alive.count_ones());
@@ -162,11 +228,11 @@ impl Frustum {
         masks: &mut PlaneMasks,
         tally: &mut Tally,
     ) -> u8 {
-        let last = &mut self.last[block];
+        let mut last = self.last[block];
         let first = bits(wanted).filter(|k| last[*k] & alive != 0).fold(0, |m, k| m | 1 << k);
         let mut alive = alive;
         if first != 0 {
-            (self.kernels.block)(&self.frame, bounds, first, want_inside, masks);
+            self.ask(bounds, block, first, alive, want_inside, masks, tally);
             for k in bits(first) {
                 tally.plane_tests += u64::from((alive & last[k]).count_ones());
                 alive &= !(masks.outside[k] & last[k]);
@@ -175,7 +241,7 @@ impl Frustum {
                 return 0;
             }
         }
-        (self.kernels.block)(&self.frame, bounds, wanted & !first, want_inside, masks);
+        self.ask(bounds, block, wanted & !first, alive, want_inside, masks, tally);
         for k in bits(wanted) {
             let tested = alive & !last[k];
             tally.plane_tests += u64::from(tested.count_ones());
@@ -186,6 +252,7 @@ impl Frustum {
                 last[k] |= rejected;
             }
         }
+        self.last[block] = last;
         alive
     }
 
@@ -205,7 +272,10 @@ impl Frustum {
 
 impl Test for Frustum {
     fn class(&self) -> Class {
-        Class::Conservative
+        match self.numbers {
+            Numbers::World { .. } => Class::Aggressive,
+            _ => Class::Conservative,
+        }
     }
 
     fn removes(&self) -> Removes {
@@ -215,7 +285,23 @@ impl Test for Frustum {
     fn prepare(&mut self, _scene: &Scene, hierarchy: &Hierarchy) -> usize {
         self.live = hierarchy.links[..hierarchy.root_blocks as usize].iter().map(|l| l.live).collect();
         self.last = if self.last_plane { vec![[0; 6]; hierarchy.links.len()] } else { Vec::new() };
-        size_of_val(&self.live[..]) + size_of_val(&self.last[..])
+        let mut bytes = size_of_val(&self.live[..]) + size_of_val(&self.last[..]);
+        if let Numbers::World { boxes, .. } = &mut self.numbers {
+            *boxes = frustum_world::column(hierarchy);
+            bytes += size_of_val(&boxes[..]);
+        }
+        bytes
+    }
+
+    fn failure(&self) -> Option<String> {
+        match self.numbers {
+            Numbers::Fixed { unfit, .. } if unfit > 0 => Some(format!(
+                "fixed_q16 reaches {} m from the camera, and {unfit} boxes or planes lay beyond: \
+                 scale the scene down, or use another arithmetic",
+                crate::math::fixed::REACH_M
+            )),
+            _ => None,
+        }
     }
 
     fn reset(&mut self) {
@@ -224,6 +310,12 @@ impl Test for Frustum {
 
     fn begin(&mut self, view: &View, hierarchy: &Hierarchy) {
         self.frame = FramePlanes::new(view, hierarchy.origin);
+        match &mut self.numbers {
+            Numbers::Single => {}
+            Numbers::World { planes, .. } => *planes = WorldPlanes::new(view),
+            Numbers::Double { planes, .. } => *planes = DoublePlanes::new(view, hierarchy.origin),
+            Numbers::Fixed { planes, .. } => *planes = FixedPlanes::new(view, hierarchy.origin),
+        }
         self.with_planes = self.node_test != NodeTest::Box && hierarchy.half_spaces.is_some();
         self.with_boxes = self.node_test != NodeTest::Plane || !self.with_planes;
         if self.with_planes {
@@ -247,7 +339,7 @@ impl Test for Frustum {
             alive = if self.last_plane {
                 self.last_first(bounds, block as usize, carry, alive, want_inside, &mut masks, tally)
             } else {
-                self.in_order(bounds, carry, alive, want_inside, &mut masks, tally)
+                self.in_order(bounds, block as usize, carry, alive, want_inside, &mut masks, tally)
             };
             carries = planes_left(&masks, carry, self.plane_mask);
         }
@@ -258,7 +350,7 @@ impl Test for Frustum {
     }
 
     fn judge_flat(&mut self, hierarchy: &Hierarchy, outside: &mut [u8], tally: &mut Tally) {
-        if self.last_plane || self.with_planes {
+        if self.last_plane || self.with_planes || !matches!(self.numbers, Numbers::Single) {
             return super::judge_flat_by_block(self, hierarchy, outside, tally);
         }
         let bounds = &hierarchy.bounds[..outside.len()];

@@ -6,9 +6,12 @@ pub mod depth_first;
 mod descent;
 pub mod flat;
 pub mod frustum;
+pub mod frustum_double;
+pub mod frustum_fixed;
 pub mod frustum_planes;
 pub mod frustum_scalar;
 pub mod frustum_volume;
+pub mod frustum_world;
 #[cfg(target_arch = "x86_64")]
 pub mod frustum_x86;
 pub mod normal_mask;
@@ -96,6 +99,11 @@ pub trait Test: Send {
     /// entitled to remove ([`DrawList::retain`]). A test of nodes alone leaves it.
     fn filter(&mut self, hierarchy: &Hierarchy, list: &mut DrawList, tally: &mut Tally) {
         let _ = (hierarchy, list, tally);
+    }
+    /// Why what was computed since [`Test::prepare`] cannot be used (a number that
+    /// did not fit), and what to do; such a run fails.
+    fn failure(&self) -> Option<String> {
+        None
     }
 }
 

@@ -7,6 +7,7 @@ use super::ranges;
 use super::source::{Mistakes, Place};
 use super::tree::{Data, Node, get};
 use crate::error::{Error, Result, did_you_mean};
+use crate::math::{Arithmetic, arithmetic};
 use crate::registry::{Entry, Param, Spec, Value, find, format_sum, parse_sum};
 use crate::{culling, structure};
 use std::collections::HashSet;
@@ -65,7 +66,43 @@ pub static AXES: &[Axis] = &[
         parts: || parts(culling::WALKS),
         check: |spec| find("walk", culling::WALKS, spec).map(|(_, s)| s),
     },
+    Axis {
+        name: arithmetic::NAME,
+        what: "arithmetic",
+        sum: false,
+        default: &["f32_relative"],
+        auto: None,
+        parts: arithmetics,
+        check: known_arithmetic,
+    },
 ];
+
+fn arithmetics() -> Vec<Part> {
+    Arithmetic::ALL.iter().map(|a| Part { name: a.name(), revision: a.revision(), params: &[] }).collect()
+}
+
+fn known_arithmetic(spec: &Spec) -> Result<Spec> {
+    if Arithmetic::named(&spec.kind).is_some() {
+        return spec.resolve(&[]);
+    }
+    let mut e = Error::new(format!("unknown arithmetic `{}`", spec.kind));
+    e.help = Some(match did_you_mean(&spec.kind, Arithmetic::NAMES.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("known: {}", Arithmetic::NAMES.join(", ")),
+    });
+    Err(e)
+}
+
+/// Whether a part of the sum is evaluated in the arithmetic of the axis: it knows
+/// arithmetics and names none itself.
+pub fn takes_arithmetic(culling: &[Spec]) -> bool {
+    culling.iter().any(|s| culling::knows_arithmetic(&s.kind) && !s.params.contains_key(arithmetic::NAME))
+}
+
+/// Whether `value` of the axis is what a run has that names none: it is in no id.
+pub fn is_silent(axis: &Axis, value: &[Spec]) -> bool {
+    axis.name == arithmetic::NAME && value.first().is_some_and(|s| s.kind == Arithmetic::default().name())
+}
 
 /// A list has no hierarchy to walk: every block is judged.
 fn walk_for(structure: &Spec) -> Spec {

@@ -125,6 +125,22 @@ pub fn sign_along(v0: DVec3, v1: DVec3, v2: DVec3, direction: DVec3) -> Ordering
     sign_of_rows(&from_v0(v1), &from_v0(v2), &[0, 1, 2].map(|k| Whole::of(direction[k], unit)))
 }
 
+/// The sign of `normal . (origin + corner - eye) + offset`.
+///
+/// # Panics
+/// If a number is not finite.
+pub fn sign_of_plane(normal: DVec3, corner: DVec3, origin: DVec3, eye: DVec3, offset: f64) -> Ordering {
+    let unit = common_unit(&[corner, origin, eye]);
+    let normal_unit = common_unit(&[normal]);
+    // The product of a whole normal and a whole place has the unit of both, which the
+    // offset must be a multiple of too: a finer offset refines the places.
+    let offset_unit = if offset == 0.0 { i32::MAX } else { decompose(offset).1 };
+    let unit = unit.min(offset_unit.saturating_sub(normal_unit));
+    let place = |k: usize| Whole::of(origin[k], unit).plus(&Whole::of(corner[k], unit)).minus(&Whole::of(eye[k], unit));
+    let sum = Whole::of(offset, unit + normal_unit);
+    (0..3).fold(sum, |sum, k| sum.plus(&Whole::of(normal[k], normal_unit).times(&place(k)))).sign()
+}
+
 fn common_unit(points: &[DVec3]) -> i32 {
     points.iter().flat_map(|p| p.to_array()).filter(|x| *x != 0.0).map(|x| decompose(x).1).min().unwrap_or(0)
 }
@@ -138,6 +154,38 @@ fn sign_of_rows(a: &[Whole; 3], b: &[Whole; 3], c: &[Whole; 3]) -> Ordering {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn an_offset_finer_than_all_else_still_decides() {
+        for (offset, expected) in [(-1.0, Ordering::Less), (0.0, Ordering::Equal), (5e-324, Ordering::Greater)] {
+            assert_eq!(sign_of_plane(DVec3::X, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, offset), expected);
+            let far = DVec3::new(1e8, 0.0, 0.0);
+            assert_eq!(sign_of_plane(DVec3::new(0.6, 0.0, 0.8), DVec3::ZERO, far, far, offset), expected);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn plane_signs_agree_with_i128(v in proptest::array::uniform12(-(1i64 << 40)..(1i64 << 40)), o in -3i64..3) {
+            let unit = (-20f64).exp2();
+            let point = |i: usize| DVec3::new(v[i] as f64, v[i + 1] as f64, v[i + 2] as f64) * unit;
+            let sum: i128 = (0..3)
+                .map(|k| i128::from(v[k]) * (i128::from(v[k + 3]) + i128::from(v[k + 6]) - i128::from(v[k + 9])))
+                .sum();
+            let found = sign_of_plane(point(0), point(3), point(6), point(9), 0.0);
+            prop_assert_eq!(found, sum.cmp(&0));
+            // On the plane, and a hair off it.
+            let offset = -(sum as f64);
+            if offset as i128 == -sum {
+                let hair = o as f64 * unit * unit;
+                let found = sign_of_plane(point(0), point(3), point(6), point(9), offset * unit * unit);
+                prop_assert_eq!(found, Ordering::Equal);
+                let beside = offset * unit * unit + hair;
+                let exact = (sum + (beside / (unit * unit)) as i128).cmp(&0);
+                prop_assert_eq!(sign_of_plane(point(0), point(3), point(6), point(9), beside), exact);
+            }
+        }
+    }
 
     proptest! {
         #[test]

@@ -3,9 +3,10 @@
 
 use crate::claim::{Selection, Selector};
 use crate::error::Error;
-use crate::manifest::axes::{AXES, AxisValue};
+use crate::manifest::axes::{AXES, AxisValue, takes_arithmetic};
 use crate::manifest::source::Mistakes;
 use crate::manifest::{Include, Manifest};
+use crate::math::{Arithmetic, arithmetic};
 use crate::registry::{Spec, Value};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -66,6 +67,12 @@ impl Pool {
                     n
                 }
             };
+        }
+        // Where no test asks for an arithmetic, all of them are one cell.
+        let position = |name: &str| AXES.iter().position(|a| a.name == name).expect("a known axis");
+        let (culling, arithmetic) = (position("culling"), position(arithmetic::NAME));
+        if !takes_arithmetic(self.value(cell.values[culling])) {
+            cell.values[arithmetic] = self.number(arithmetic, &vec![Spec::new(Arithmetic::default().name())]);
         }
     }
 

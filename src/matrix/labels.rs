@@ -1,5 +1,6 @@
 //! Short names of a run's parts, without parameters that have their default.
 
+use crate::claim::axis_value;
 use crate::manifest::axes::{AXES, axis};
 use crate::record::RunSpec;
 use crate::registry::Spec;
@@ -13,13 +14,17 @@ pub struct Labels {
     pub walk: String,
     /// The walk is not the structure's own.
     pub walk_is_special: bool,
+    pub arithmetic: String,
+    /// The arithmetic is not the default.
+    pub arithmetic_is_special: bool,
 }
 
 impl Labels {
-    /// `octree × frustum`, the walk only where it is not the usual one.
+    /// `octree × frustum`, walk and arithmetic only where they are not the usual ones.
     pub fn cell(&self) -> String {
         let walk = if self.walk_is_special { format!(" × {}", self.walk) } else { String::new() };
-        format!("{} × {}{walk}", self.structure, self.culling)
+        let arithmetic = if self.arithmetic_is_special { format!(" × {}", self.arithmetic) } else { String::new() };
+        format!("{} × {}{walk}{arithmetic}", self.structure, self.culling)
     }
 
     /// By axis name; an unknown axis has no label.
@@ -30,6 +35,7 @@ impl Labels {
             "structure" => &self.structure,
             "culling" => &self.culling,
             "walk" => &self.walk,
+            "arithmetic" => &self.arithmetic,
             _ => return String::new(),
         }
         .clone()
@@ -46,6 +52,8 @@ pub fn labels(run: &RunSpec) -> Labels {
         culling: label("culling", &run.culling),
         walk,
         walk_is_special: usual.as_ref() != Some(&run.walk),
+        arithmetic: label("arithmetic", &axis_value(run, "arithmetic")),
+        arithmetic_is_special: run.axes.contains_key("arithmetic"),
     }
 }
 

@@ -8,7 +8,7 @@ pub mod plan;
 use crate::claim::selects;
 use crate::error::Error;
 use crate::manifest::Manifest;
-use crate::manifest::axes::AXES;
+use crate::manifest::axes::{AXES, is_silent};
 use crate::manifest::source::Mistakes;
 use crate::record::{Protocol, RunSpec};
 use crate::results::Excluded;
@@ -155,10 +155,13 @@ fn build(manifest: &Manifest, setting: &Setting, pool: &Pool, cell: &Cell) -> Ru
     let mut named: BTreeMap<&str, &Vec<crate::registry::Spec>> = BTreeMap::new();
     for (axis, id) in AXES.iter().zip(&cell.values) {
         let value = pool.value(*id);
+        named.insert(axis.name, value);
+        if is_silent(axis, value) {
+            continue;
+        }
         for (spec, revision) in value.iter().zip(pool.revisions(*id)) {
             revisions.insert(format!("{}.{}", axis.name, spec.kind), *revision);
         }
-        named.insert(axis.name, value);
         if !matches!(axis.name, "structure" | "culling" | "walk")
             && let Some(spec) = value.first()
         {
