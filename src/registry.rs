@@ -112,8 +112,18 @@ impl Spec {
             };
             out.params.insert(key.clone(), param.check(value)?);
         }
-        for param in params.iter().filter(|p| !matches!(p.default, Default::Axis(_))) {
-            out.params.entry(param.name.to_string()).or_insert_with(|| param.default.value());
+        for param in params {
+            match param.default {
+                Default::Axis(_) => {}
+                Default::Optional(_) => {
+                    if out.params.get(param.name) == Some(&param.default.value()) {
+                        out.params.remove(param.name);
+                    }
+                }
+                _ => {
+                    out.params.entry(param.name.to_string()).or_insert_with(|| param.default.value());
+                }
+            }
         }
         Ok(out)
     }
@@ -146,6 +156,11 @@ impl Spec {
             Some(Value::Text(s)) => s,
             other => panic!("unresolved spec: {}.{key} is {other:?}", self.kind),
         }
+    }
+
+    /// The same for [`Default::Optional`]: `None` is the default.
+    pub fn optional_text(&self, key: &str) -> Option<&str> {
+        self.params.contains_key(key).then(|| self.text(key))
     }
 
     /// The spec without parameters that have their default: short labels for charts.
@@ -224,6 +239,9 @@ pub enum Default {
     Bool(bool),
     /// The first choice is the default.
     Choice(&'static [&'static str]),
+    /// The same, but [`Spec::resolve`] leaves the default out, given or not: for a
+    /// parameter that came after runs were stored, whose ids must not change.
+    Optional(&'static [&'static str]),
     /// One of these names. Not given, it is taken from the axis of the same name,
     /// and [`Spec::resolve`] leaves it out.
     Axis(&'static [&'static str]),
@@ -235,7 +253,7 @@ impl Default {
             Default::Int { value, .. } => Value::Int(*value),
             Default::Float { value, .. } => Value::Float(*value),
             Default::Bool(b) => Value::Bool(*b),
-            Default::Choice(c) => Value::Text(c[0].to_string()),
+            Default::Choice(c) | Default::Optional(c) => Value::Text(c[0].to_string()),
             Default::Axis(_) => Value::Text("the axis' value".to_string()),
         }
     }
@@ -256,10 +274,12 @@ impl Param {
             (Default::Bool(_), Value::Bool(_)) => Ok(value.clone()),
             (Default::Bool(_), _) => wrong("true or false".to_string()),
             // By its printed form, so that a choice may be a number: `sectors=8`.
-            (Default::Choice(c) | Default::Axis(c), _) if c.contains(&value.to_string().as_str()) => {
+            (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _)
+                if c.contains(&value.to_string().as_str()) =>
+            {
                 Ok(Value::Text(value.to_string()))
             }
-            (Default::Choice(c) | Default::Axis(c), _) => {
+            (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _) => {
                 let list = c.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
                 let near = did_you_mean(&value.to_string(), c.iter().copied());
                 let mut e = Error::new(format!("is {value}, but must be one of {list}")).key(name);
@@ -325,5 +345,23 @@ mod tests {
         assert!(e.to_string().contains("from 0 to 10"), "{e}");
         let e = Spec::parse("octree:root=cub").unwrap().resolve(PARAMS).unwrap_err();
         assert_eq!(e.help.as_deref(), Some("did you mean \"cube\"?"));
+    }
+
+    #[test]
+    fn an_optional_choice_is_named_only_where_it_is_not_the_default() {
+        static PARAMS: &[Param] = &[
+            Param { name: "cells", default: Default::Int { value: 4, min: 1, max: 18 }, about: "" },
+            Param { name: "rays", default: Default::Optional(&["view", "node"]), about: "" },
+        ];
+        let resolved = |text: &str| Spec::parse(text).unwrap().resolve(PARAMS);
+        for text in ["normal_mask", "normal_mask:rays=view"] {
+            let spec = resolved(text).unwrap();
+            assert_eq!((spec.to_string().as_str(), spec.optional_text("rays")), ("normal_mask:cells=4", None));
+        }
+        let spec = resolved("normal_mask:rays=node").unwrap();
+        assert_eq!(spec.to_string(), "normal_mask:cells=4,rays=node");
+        assert_eq!((spec.label(PARAMS).as_str(), spec.optional_text("rays")), ("normal_mask:rays=node", Some("node")));
+        let e = resolved("normal_mask:rays=nodes").unwrap_err();
+        assert_eq!(e.help.as_deref(), Some("did you mean \"node\"?"));
     }
 }

@@ -13,8 +13,9 @@
 //! f64 at any distance from the origin. Boxes with NaN or infinite bounds are kept.
 //! The other arithmetics: `frustum_world` (aggressive), `frustum_double`, `frustum_fixed`.
 
-use super::frustum_double::{DoublePlanes, Level};
+use super::frustum_double::DoublePlanes;
 use super::frustum_fixed::FixedPlanes;
+use super::frustum_numbers::Numbers;
 use super::frustum_planes::{FramePlanes, PlaneMasks, Work};
 use super::frustum_volume::Volume;
 use super::frustum_world::WorldPlanes;
@@ -102,38 +103,6 @@ pub fn kernels() -> Vec<Kernels> {
     }
     found.push(Kernels { name: "scalar", block: scalar::block, flat: scalar::flat });
     found
-}
-
-/// Planes and columns of an arithmetic other than the wide kernels' own.
-enum Numbers {
-    /// Guarded single precision: the kernels.
-    Single,
-    World {
-        planes: WorldPlanes,
-        boxes: Vec<BoundsBlock>,
-    },
-    Double {
-        level: Level,
-        planes: DoublePlanes,
-    },
-    Fixed {
-        planes: FixedPlanes,
-        unfit: u64,
-    },
-}
-
-impl Numbers {
-    fn new(arithmetic: Arithmetic) -> Numbers {
-        let double = |level| Numbers::Double { level, planes: DoublePlanes::default() };
-        match arithmetic {
-            Arithmetic::F32Relative => Numbers::Single,
-            Arithmetic::F32World => Numbers::World { planes: WorldPlanes::default(), boxes: Vec::new() },
-            Arithmetic::F64 => double(Level::F64),
-            Arithmetic::Filtered => double(Level::Filtered),
-            Arithmetic::Exact => double(Level::Exact),
-            Arithmetic::FixedQ16 => Numbers::Fixed { planes: FixedPlanes::default(), unfit: 0 },
-        }
-    }
 }
 
 /// Carry while only half-spaces are tested: they never prove "wholly inside".
@@ -306,6 +275,9 @@ impl Test for Frustum {
 
     fn reset(&mut self) {
         self.last.fill([0; 6]);
+        if let Numbers::Fixed { unfit, .. } = &mut self.numbers {
+            *unfit = 0;
+        }
     }
 
     fn begin(&mut self, view: &View, hierarchy: &Hierarchy) {

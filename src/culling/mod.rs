@@ -2,22 +2,36 @@
 //! left, or both; a [`Walk`] owns order and temporal state. The manifest composes
 //! them; neither knows any structure.
 
+pub mod back_face;
 pub mod depth_first;
 mod descent;
+pub mod facing_columns;
+pub mod facing_fixed;
+pub mod facing_kernels;
+#[cfg(target_arch = "x86_64")]
+pub mod facing_x86;
 pub mod flat;
 pub mod frustum;
 pub mod frustum_double;
 pub mod frustum_fixed;
+mod frustum_numbers;
 pub mod frustum_planes;
 pub mod frustum_scalar;
 pub mod frustum_volume;
 pub mod frustum_world;
 #[cfg(target_arch = "x86_64")]
 pub mod frustum_x86;
+pub mod look_at;
+pub mod normal_cone;
 pub mod normal_mask;
+mod normal_mask_local;
 pub mod octant_mask;
 #[cfg(target_arch = "x86_64")]
 mod prefetch_x86;
+pub mod sector;
+#[cfg(target_arch = "x86_64")]
+pub mod sector_x86;
+pub mod triangle_words;
 
 use crate::error::Result;
 use crate::hierarchy::Hierarchy;
@@ -100,8 +114,8 @@ pub trait Test: Send {
     fn filter(&mut self, hierarchy: &Hierarchy, list: &mut DrawList, tally: &mut Tally) {
         let _ = (hierarchy, list, tally);
     }
-    /// Why what was computed since [`Test::prepare`] cannot be used (a number that
-    /// did not fit), and what to do; such a run fails.
+    /// Why the answers since [`Test::reset`] must not be used, if so: a number did not
+    /// fit its arithmetic, say; the sentence says what to do, and the run fails.
     fn failure(&self) -> Option<String> {
         None
     }
@@ -267,7 +281,15 @@ impl Tally {
 }
 
 /// Sorted by name.
-pub static TESTS: &[Entry<dyn Test>] = &[frustum::ENTRY, normal_mask::ENTRY, octant_mask::ENTRY];
+pub static TESTS: &[Entry<dyn Test>] = &[
+    back_face::ENTRY,
+    frustum::ENTRY,
+    look_at::ENTRY,
+    normal_cone::ENTRY,
+    normal_mask::ENTRY,
+    octant_mask::ENTRY,
+    sector::ENTRY,
+];
 
 /// Sorted by name.
 pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, flat::ENTRY];

@@ -21,10 +21,15 @@
 //! bound nothing outside it. It is invisible, but not for its facing: the test
 //! therefore removes back-facing triangles **and** triangles outside the frustum.
 //!
+//! `rays = "node"` (`normal_mask_local`) takes the rays from the eye to the node's box in
+//! place of those of the whole view.
+//!
 //! The guard of `8 * 2^-24` relative to `|q||r|` exceeds the direction error of an
 //! f64 normal by 400 for all but slivers; slivers, degenerate triangles (no normal)
 //! and two-sided ones set a reserved bit that is always front.
 
+use super::facing_columns::trusted_normal;
+use super::normal_mask_local::Local;
 use super::*;
 use crate::hierarchy::{LANES, NONE};
 use crate::math::DVec3;
@@ -35,22 +40,28 @@ pub const ENTRY: Entry<dyn Test> = Entry {
     name: "normal_mask",
     about: "skip nodes whose normals are all averted from the whole view (Zhang & Hoff 1997)",
     revision: 1,
-    params: &[Param {
-        name: "cells",
-        // 6 * 18^2 + 1 cells are the most that two bytes a triangle can name
-        // with one byte value reserved, as the original stores them.
-        default: Allowed::Int { value: 4, min: 1, max: 18 },
-        about: "cells along an edge of each cube-map face; 6 cells^2 in all",
-    }],
-    make: |spec| Box::new(NormalMask::new(spec.int("cells") as usize)),
+    params: &[
+        Param {
+            name: "cells",
+            // 6 * 18^2 + 1 cells are the most that two bytes a triangle can name
+            // with one byte value reserved, as the original stores them.
+            default: Allowed::Int { value: 4, min: 1, max: 18 },
+            about: "cells along an edge of each cube-map face; 6 cells^2 in all",
+        },
+        Param {
+            name: "rays",
+            default: Allowed::Optional(&["view", "node"]),
+            about: "what a cell is averted from: all rays of the view, or only those from the eye to the node's box",
+        },
+    ],
+    make: |spec| {
+        let local = spec.optional_text("rays") == Some("node");
+        Box::new(NormalMask::new(spec.int("cells") as usize).with_rays_to_nodes(local))
+    },
 };
 
 /// Relative guard of the corner test.
-const GUARD: f64 = 8.0 / (1u32 << 24) as f64;
-
-/// A normal shorter than this share of its edges' product is a sliver's: its
-/// direction may be off by more than the guard allows for (f64 gives 1e-9 here).
-const SLIVER: f64 = 1e-6;
+pub(super) const GUARD: f64 = 8.0 / (1u32 << 24) as f64;
 
 /// Cells of the cube map of normals, plus the reserved one that is always front.
 #[derive(Debug, Clone, Copy)]
@@ -85,13 +96,10 @@ impl Cells {
 
     /// Cell of a triangle; the reserved one if it has no trustworthy normal or no back.
     pub fn of_triangle(self, scene: &Scene, t: u32) -> usize {
-        let [a, b, c] = scene.corners(t);
-        let (ab, ac) = (b - a, c - a);
-        let n = ab.cross(ac);
-        let length = n.length();
-        // Written so that NaN counts as a sliver.
-        let sound = length > 0.0 && length.is_finite() && length >= SLIVER * (ab.length() * ac.length());
-        if scene.two_sided[t as usize] || !sound { self.count() } else { self.of_direction(n) }
+        match trusted_normal(&scene.corners(t)) {
+            Some(n) if !scene.two_sided[t as usize] => self.of_direction(n),
+            _ => self.count(),
+        }
     }
 
     /// Corners of a cell on the surface of the cube of half size 1.
@@ -143,6 +151,8 @@ pub struct NormalMask {
     /// Bit set: the cell may hold front-facing normals this frame.
     front: Vec<u64>,
     all_front: bool,
+    /// Rays to the nodes' boxes decide, not those of the view.
+    local: Option<Local>,
 }
 
 impl NormalMask {
@@ -150,7 +160,26 @@ impl NormalMask {
         let cells = Cells { per_edge: cells };
         let lattice = cells.lattice();
         let averted = vec![false; lattice.len()];
-        NormalMask { cells, masks: Vec::new(), lattice, averted, front: vec![!0; cells.words()], all_front: true }
+        NormalMask {
+            cells,
+            masks: Vec::new(),
+            lattice,
+            averted,
+            front: vec![!0; cells.words()],
+            all_front: true,
+            local: None,
+        }
+    }
+
+    /// The same with the rays from the eye to each node's box.
+    pub fn with_rays_to_nodes(self, yes: bool) -> NormalMask {
+        NormalMask { local: yes.then(|| Local::new(self.cells)), ..self }
+    }
+}
+
+impl NormalMask {
+    fn is_local(&self) -> bool {
+        self.local.as_ref().is_some_and(Local::is_perspective)
     }
 }
 
@@ -189,7 +218,11 @@ impl Test for NormalMask {
         size_of_val(&self.masks[..])
     }
 
-    fn begin(&mut self, view: &View, _hierarchy: &Hierarchy) {
+    fn begin(&mut self, view: &View, hierarchy: &Hierarchy) {
+        // Parallel rays are the same to every node.
+        if let Some(local) = self.local.as_mut() {
+            local.begin(view, hierarchy.origin);
+        }
         let rays = view.corner_rays().map(|r| (r, r.length()));
         // Each corner once, where `Cells::is_averted`, the naive twin, asks it for
         // every cell around it; most corners fail at the first ray.
@@ -213,14 +246,20 @@ impl Test for NormalMask {
     }
 
     fn initial_carry(&self) -> u8 {
-        u8::from(!self.all_front)
+        u8::from(!self.all_front || self.is_local())
     }
 
-    fn judge(&mut self, _: &Hierarchy, block: u32, live: u8, _carry: u8, tally: &mut Tally) -> Verdict {
+    fn judge(&mut self, hierarchy: &Hierarchy, block: u32, live: u8, _carry: u8, tally: &mut Tally) -> Verdict {
         let lanes = u64::from(live.count_ones());
         tally.lane_tests += lanes;
         tally.mask_tests += lanes;
         let words = self.front.len();
+        if let (true, Some(local)) = (self.is_local(), &self.local) {
+            let masks = &self.masks[block as usize * words..][..words];
+            let outside = local.outside(&hierarchy.bounds[block as usize], masks, live);
+            // Smaller boxes below may be averted though this one is not.
+            return Verdict { outside, carry: [1; LANES] };
+        }
         let (mut facing, mut averted) = ([0u64; LANES], [0u64; LANES]);
         for (masks, front) in self.masks[block as usize * words..][..words].iter().zip(&self.front) {
             for lane in 0..LANES {

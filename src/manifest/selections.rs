@@ -119,8 +119,17 @@ fn mismatch(default: &Default, value: &Value) -> Option<String> {
         (Default::Float { min, max, .. }, _) => Some(format!("it is a number from {min} to {max}")),
         (Default::Bool(_), Value::Bool(_)) => None,
         (Default::Bool(_), _) => Some("it is true or false".into()),
-        (Default::Choice(c) | Default::Axis(c), _) if c.contains(&value.to_string().as_str()) => None,
-        (Default::Choice(c) | Default::Axis(c), _) => Some(format!("it is one of {}", c.join(", "))),
+        (Default::Optional(c), _) if value.to_string() == c[0] => {
+            Some(format!("{} is the default, which parts do not name: leave the condition out", c[0]))
+        }
+        (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _)
+            if c.contains(&value.to_string().as_str()) =>
+        {
+            None
+        }
+        (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _) => {
+            Some(format!("it is one of {}", c.join(", ")))
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::build::{Rng, camera, list, tree, view_along};
 use crate::common::soup;
-use cullmark::culling::{DrawList, Tally, Test, make_tests, make_walk};
+use cullmark::culling::{DrawList, Tally, Test, cull, make_tests, make_walk};
 use cullmark::hierarchy::{HalfSpace, Hierarchy, NONE};
 use cullmark::math::{Camera, DVec3, Projection, View};
 use cullmark::registry::{Spec, parse_sum};
@@ -28,10 +28,7 @@ impl<'a> Method<'a> {
 
     pub fn frame(&mut self, view: &View) -> (DrawList, Tally) {
         let (mut out, mut tally) = (DrawList::default(), Tally::default());
-        for t in &mut self.tests {
-            t.begin(view, self.hierarchy);
-        }
-        self.walk.run(view, self.hierarchy, &mut self.tests, &mut out, &mut tally);
+        cull(view, self.hierarchy, &mut self.tests, self.walk.as_mut(), &mut out, &mut tally);
         (out, tally)
     }
 }

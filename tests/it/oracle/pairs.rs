@@ -24,7 +24,7 @@ fn structures() -> Vec<String> {
     all
 }
 
-const CULLINGS: [&str; 9] = [
+const CULLINGS: [&str; 25] = [
     "none",
     "frustum",
     "frustum:plane_mask=false",
@@ -34,6 +34,22 @@ const CULLINGS: [&str; 9] = [
     "octant_mask",
     "frustum+normal_mask",
     "frustum+octant_mask",
+    "back_face:arithmetic=f32_world",
+    "back_face:arithmetic=f32_world,form=difference",
+    "back_face:arithmetic=f32_relative",
+    "back_face:arithmetic=f64",
+    "back_face:arithmetic=filtered",
+    "back_face:arithmetic=exact",
+    "back_face:arithmetic=fixed_q16",
+    "frustum+normal_cone+back_face",
+    "look_at",
+    "sector",
+    "sector:rule=averted",
+    "sector:rule=safe,sectors=16",
+    "normal_cone",
+    "normal_cone:form=tight",
+    "normal_cone:form=apex",
+    "normal_mask:rays=node",
 ];
 
 fn generated(spec: &str) -> Scene {
