@@ -274,7 +274,9 @@ impl Param {
             (Default::Bool(_), Value::Bool(_)) => Ok(value.clone()),
             (Default::Bool(_), _) => wrong("true or false".to_string()),
             // By its printed form, so that a choice may be a number: `sectors=8`.
-            (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _) if c.contains(&value.to_string().as_str()) => {
+            (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _)
+                if c.contains(&value.to_string().as_str()) =>
+            {
                 Ok(Value::Text(value.to_string()))
             }
             (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _) => {

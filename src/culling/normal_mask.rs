@@ -160,7 +160,15 @@ impl NormalMask {
         let cells = Cells { per_edge: cells };
         let lattice = cells.lattice();
         let averted = vec![false; lattice.len()];
-        NormalMask { cells, masks: Vec::new(), lattice, averted, front: vec![!0; cells.words()], all_front: true, local: None }
+        NormalMask {
+            cells,
+            masks: Vec::new(),
+            lattice,
+            averted,
+            front: vec![!0; cells.words()],
+            all_front: true,
+            local: None,
+        }
     }
 
     /// The same with the rays from the eye to each node's box.

@@ -127,7 +127,9 @@ fn mismatch(default: &Default, value: &Value) -> Option<String> {
         {
             None
         }
-        (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _) => Some(format!("it is one of {}", c.join(", "))),
+        (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _) => {
+            Some(format!("it is one of {}", c.join(", ")))
+        }
     }
 }
 
