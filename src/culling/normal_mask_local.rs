@@ -100,3 +100,46 @@ fn averted(corners: &[(DVec3, f64); 4], lo: &[Lanes; 3], hi: &[Lanes; 3], guard:
     }
     lanes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Box32, Camera, Pose};
+    use glam::Vec3;
+    use rand_chacha::rand_core::{RngCore, SeedableRng};
+
+    #[test]
+    fn picking_a_bound_by_sign_gives_what_asking_all_eight_corners_gives() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+        let mut unit = move || (rng.next_u32() >> 8) as f32 / (1 << 23) as f32 - 1.0;
+        let mut vector = move |by: f32| Vec3::new(unit(), unit(), unit()) * by;
+        let cells = Cells { per_edge: 3 };
+        let mut found = 0;
+        for _ in 0..200 {
+            let mut bounds = BoundsBlock::EMPTY;
+            let mut masks = [[0u64; LANES]; 1];
+            for lane in 0..LANES {
+                let (centre, half) = (vector(20.0), vector(2.0).abs());
+                bounds.set(lane, Box32 { lo: centre - half, hi: centre + half });
+                // Some neighbouring cells.
+                masks[0][lane] = 0b1011 << (centre.x.abs() * 2.4) as u32;
+            }
+            let eye = vector(5.0).as_dvec3();
+            let mut local = Local::new(cells);
+            local.begin(&View::new(&Camera::default(), &Pose { eye, forward: DVec3::X, up: DVec3::Z }), DVec3::ZERO);
+            let outside = local.outside(&bounds, &masks, 0x7f);
+            for lane in 0..LANES {
+                let b = bounds.get(lane);
+                let (lo, hi) = (b.lo.as_dvec3() - eye, b.hi.as_dvec3() - eye);
+                let far = (lo.abs() + hi.abs()).element_sum();
+                let guard = GUARD * far + (eye.abs().max_element() + far) * ULPS;
+                let ray = |i: usize| DVec3::from_array([0, 1, 2].map(|k| if i >> k & 1 == 1 { hi[k] } else { lo[k] }));
+                let away = |q: &DVec3| (0..8).all(|i| q.dot(ray(i)) >= guard * q.length());
+                let all = (0..64).filter(|c| masks[0][lane] >> c & 1 == 1).all(|c| cells.corners(c).iter().all(away));
+                assert_eq!(outside >> lane & 1 == 1, all && lane < 7);
+                found += u32::from(all);
+            }
+        }
+        assert!(found > 100, "{found}");
+    }
+}

@@ -1,10 +1,13 @@
 //! Culling tests and walks: facts B2-B5, C1, C3 and C4 of the algorithm notes, and
 //! the agreement of all kernels, accelerations and walks.
 
+mod back_face;
 mod build;
+mod cones;
 mod facing;
 mod frustum;
 mod kernels;
 mod masks;
 mod numbers;
+mod sectors;
 mod walks;

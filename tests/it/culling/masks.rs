@@ -9,7 +9,7 @@ use cullmark::math::{Camera, DVec3, Pose, Projection, View};
 use cullmark::scene::Scene;
 
 /// Some point of the triangle is certainly in the view volume, by clipping it in f64.
-fn meets(view: &View, corners: [DVec3; 3]) -> bool {
+pub fn meets(view: &View, corners: [DVec3; 3]) -> bool {
     let mut polygon: Vec<DVec3> = corners.map(|c| c - view.eye).to_vec();
     for plane in &view.planes {
         let at = |p: DVec3| plane.normal.dot(p) + plane.offset_m - 1e-9;
@@ -31,7 +31,7 @@ fn meets(view: &View, corners: [DVec3; 3]) -> bool {
     true
 }
 
-fn is_front(view: &View, corners: [DVec3; 3]) -> bool {
+pub fn is_front(view: &View, corners: [DVec3; 3]) -> bool {
     // Orthographic: as seen from infinitely far behind.
     if view.is_perspective() {
         exact_facing(corners, view.eye) > 0.0
