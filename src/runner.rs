@@ -175,6 +175,17 @@ impl Setup {
         Judgement { class: self.class, removes, wrong, frames, frames_hash: self.frames_hash(&work) }
     }
 
+    /// After a pass: an error if some test calls it void.
+    ///
+    /// # Errors
+    /// With the test's own sentence ([`Test::failure`]).
+    pub fn check(&self) -> Result<()> {
+        match self.tests.iter().find_map(|t| t.failure()) {
+            Some(why) => Err(Error::new(why)),
+            None => Ok(()),
+        }
+    }
+
     fn frames_hash(&self, work: &[FrameWork]) -> String {
         let mut h = blake3::Hasher::new();
         for entry in &self.hierarchy.entries {
@@ -190,7 +201,7 @@ impl Setup {
 /// Times one repeat in this process, which should do nothing else.
 ///
 /// # Errors
-/// As [`Setup::new`]; also when two passes submit different sets.
+/// As [`Setup::new`]; also when two passes submit different sets, or a test calls a pass void.
 pub fn time_trial(spec: &RunSpec, cache: &Path) -> Result<TrialRecord> {
     let protocol = &spec.protocol;
     if protocol.passes == 0 {
@@ -206,6 +217,7 @@ pub fn time_trial(spec: &RunSpec, cache: &Path) -> Result<TrialRecord> {
     let mut setup = Setup::new(spec, cache)?;
     let before_ns = machine::sentinel_ns();
     let work = setup.count_pass(|_, _, _| ());
+    setup.check()?;
     let frames = setup.views.len();
     let mut list = DrawList::default();
     let mut passes_ns = Vec::new();
@@ -226,6 +238,7 @@ pub fn time_trial(spec: &RunSpec, cache: &Path) -> Result<TrialRecord> {
                 .help("the method reads a clock or keeps state that `reset` forgets to clear"));
             }
         }
+        setup.check()?;
         if pass >= protocol.warmup_passes {
             switches += machine::involuntary_switches() - switches_before;
             passes_ns.push(times_ns);
@@ -297,7 +310,7 @@ fn sum(series: &Series) -> Counter {
 /// Judges the answer of `spec` against the truth at sampled frames.
 ///
 /// # Errors
-/// As [`Setup::new`]. An answer that is wrong for its class is not an error but
+/// As [`Setup::new`], or when a test calls its pass void. An answer that is wrong for its class is not an error but
 /// a judgement with `wrong` set.
 pub fn judge(spec: &RunSpec, cache: &Path) -> Result<Judgement> {
     if let Some(core) = spec.protocol.pin_core {
@@ -309,7 +322,9 @@ pub fn judge(spec: &RunSpec, cache: &Path) -> Result<Judgement> {
     let mut setup = Setup::new(spec, cache)?;
     let poses = setup.judged_poses(&spec.accuracy);
     let truth = oracle::truth_cached(&setup.scene, &spec.camera, &poses, &spec.accuracy, cache, &spec.truth_id())?;
-    Ok(setup.judge(&truth))
+    let judgement = setup.judge(&truth);
+    setup.check()?;
+    Ok(judgement)
 }
 
 /// The submitted set in the oracle's terms, which know no hierarchy.

@@ -99,7 +99,7 @@ impl FramePlanes {
 }
 
 /// `a - b` and its rounding error (Knuth).
-fn two_diff(a: f64, b: f64) -> (f64, f64) {
+pub(super) fn two_diff(a: f64, b: f64) -> (f64, f64) {
     let d = a - b;
     let b_virtual = a - d;
     let a_virtual = d + b_virtual;

@@ -6,9 +6,16 @@ pub mod depth_first;
 mod descent;
 pub mod flat;
 pub mod frustum;
+pub mod frustum_arithmetic;
+pub mod frustum_exact;
+pub mod frustum_f64;
+pub mod frustum_filtered;
+pub mod frustum_fixed;
 pub mod frustum_planes;
+pub mod frustum_relative;
 pub mod frustum_scalar;
 pub mod frustum_volume;
+pub mod frustum_world;
 #[cfg(target_arch = "x86_64")]
 pub mod frustum_x86;
 pub mod normal_mask;
@@ -96,6 +103,11 @@ pub trait Test: Send {
     /// entitled to remove ([`DrawList::retain`]). A test of nodes alone leaves it.
     fn filter(&mut self, hierarchy: &Hierarchy, list: &mut DrawList, tally: &mut Tally) {
         let _ = (hierarchy, list, tally);
+    }
+    /// Why the passes since the last [`Test::reset`] are void, as a sentence that says
+    /// what to do, if they are: an overflow of fixed point, say. The run then fails.
+    fn failure(&self) -> Option<String> {
+        None
     }
 }
 

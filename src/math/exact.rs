@@ -1,4 +1,4 @@
-//! Signs of small determinants in whole numbers of unbounded length.
+//! Signs of small determinants, and sides of planes, in whole numbers of unbounded length.
 //!
 //! Every finite f64 is a whole number times a power of two, so a determinant of
 //! differences of f64 is one too: no rounding, no underflow, no overflow. Slow,
@@ -60,6 +60,19 @@ impl Whole {
             words[i + o.words.len()] = carry as u32;
         }
         Whole { negative: self.negative != o.negative, words }.trimmed()
+    }
+
+    /// Times `2^by`.
+    fn shifted(&self, by: usize) -> Whole {
+        let mut words = vec![0; by / 32];
+        let mut carry = 0;
+        for word in &self.words {
+            let wide = u64::from(*word) << (by % 32);
+            words.push(wide as u32 | carry);
+            carry = (wide >> 32) as u32;
+        }
+        words.push(carry);
+        Whole { negative: self.negative, words }.trimmed()
     }
 
     fn sign(&self) -> Ordering {
@@ -125,6 +138,21 @@ pub fn sign_along(v0: DVec3, v1: DVec3, v2: DVec3, direction: DVec3) -> Ordering
     sign_of_rows(&from_v0(v1), &from_v0(v2), &[0, 1, 2].map(|k| Whole::of(direction[k], unit)))
 }
 
+/// The sign of `normal . (origin + offset - eye) + d`: on which side of a plane that
+/// is given relative to the eye a point lies that is given relative to an origin.
+pub fn sign_of_plane(normal: DVec3, d: f64, origin: DVec3, offset: DVec3, eye: DVec3) -> Ordering {
+    let (unit, unit_n) = (common_unit(&[origin, offset, eye]), common_unit(&[normal]));
+    // In units of both, of which `d` need not be a multiple.
+    let (unit_sum, unit_d) = (unit + unit_n, common_unit(&[DVec3::splat(d)]));
+    let common = if d == 0.0 { unit_sum } else { unit_sum.min(unit_d) };
+    let mut sum = Whole::of(d, common);
+    for k in 0..3 {
+        let relative = Whole::of(origin[k], unit).plus(&Whole::of(offset[k], unit)).minus(&Whole::of(eye[k], unit));
+        sum = sum.plus(&relative.times(&Whole::of(normal[k], unit_n)).shifted((unit_sum - common) as usize));
+    }
+    sum.sign()
+}
+
 fn common_unit(points: &[DVec3]) -> i32 {
     points.iter().flat_map(|p| p.to_array()).filter(|x| *x != 0.0).map(|x| decompose(x).1).min().unwrap_or(0)
 }
@@ -162,6 +190,22 @@ mod tests {
             let det = d(0, 0) * (d(1, 1) * d(2, 2) - d(1, 2) * d(2, 1)) - d(0, 1) * (d(1, 0) * d(2, 2) - d(1, 2) * d(2, 0))
                 + d(0, 2) * (d(1, 0) * d(2, 1) - d(1, 1) * d(2, 0));
             prop_assert_eq!(sign_of_differences(point(0), point(3), point(6), point(9)), det.cmp(&0));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_side_of_a_plane_is_that_of_small_whole_numbers(
+            m in proptest::array::uniform12(-1000i64..1000), d in -3_000_000i64..3_000_000, shift in 0usize..70,
+        ) {
+            // The offset in units far below, and far above, those of the products.
+            let point = |i: usize| DVec3::new(m[i] as f64, m[i + 1] as f64, m[i + 2] as f64);
+            let dot: i64 = (0..3).map(|k| m[k] * (m[3 + k] + m[6 + k] - m[9 + k])).sum();
+            let small = libm::exp2(-(shift as f64));
+            let want = ((i128::from(dot) << shift) + i128::from(d)).cmp(&0);
+            prop_assert_eq!(sign_of_plane(point(0), d as f64 * small, point(3), point(6), point(9)), want);
+            let want = (i128::from(dot) + (i128::from(d) << shift)).cmp(&0);
+            prop_assert_eq!(sign_of_plane(point(0), d as f64 / small, point(3), point(6), point(9)), want);
         }
     }
 

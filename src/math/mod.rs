@@ -4,6 +4,8 @@ pub mod aabb;
 pub mod arithmetic;
 pub mod camera;
 pub mod exact;
+pub mod expansion;
+pub mod fixed;
 pub mod predicates;
 
 pub use aabb::{Aabb, Box32};
