@@ -119,14 +119,6 @@ impl Setup {
         culling::cull(view, &self.hierarchy, &mut self.tests, self.walk.as_mut(), out, tally);
     }
 
-    /// Whether every test could compute what it had to.
-    ///
-    /// # Errors
-    /// The first test's reason, if one could not.
-    pub fn check(&self) -> Result<()> {
-        self.tests.iter().find_map(|t| t.failure()).map_or(Ok(()), |why| Err(Error::new(why)))
-    }
-
     /// One whole pass without a clock: the work of every frame.
     pub fn count_pass(&mut self, mut each: impl FnMut(&Setup, usize, &DrawList)) -> Vec<FrameWork> {
         self.reset();
@@ -183,6 +175,17 @@ impl Setup {
         Judgement { class: self.class, removes, wrong, frames, frames_hash: self.frames_hash(&work) }
     }
 
+    /// After a pass: an error if some test calls it void.
+    ///
+    /// # Errors
+    /// With the test's own sentence ([`Test::failure`]).
+    pub fn check(&self) -> Result<()> {
+        match self.tests.iter().find_map(|t| t.failure()) {
+            Some(why) => Err(Error::new(why)),
+            None => Ok(()),
+        }
+    }
+
     fn frames_hash(&self, work: &[FrameWork]) -> String {
         let mut h = blake3::Hasher::new();
         for entry in &self.hierarchy.entries {
@@ -198,7 +201,7 @@ impl Setup {
 /// Times one repeat in this process, which should do nothing else.
 ///
 /// # Errors
-/// As [`Setup::new`]; also when two passes submit different sets.
+/// As [`Setup::new`]; also when two passes submit different sets, or a test calls a pass void.
 pub fn time_trial(spec: &RunSpec, cache: &Path) -> Result<TrialRecord> {
     let protocol = &spec.protocol;
     if protocol.passes == 0 {
@@ -214,8 +217,8 @@ pub fn time_trial(spec: &RunSpec, cache: &Path) -> Result<TrialRecord> {
     let mut setup = Setup::new(spec, cache)?;
     let before_ns = machine::sentinel_ns();
     let work = setup.count_pass(|_, _, _| ());
-    let frames = setup.views.len();
     setup.check()?;
+    let frames = setup.views.len();
     let mut list = DrawList::default();
     let mut passes_ns = Vec::new();
     let mut switches = 0;
@@ -235,6 +238,7 @@ pub fn time_trial(spec: &RunSpec, cache: &Path) -> Result<TrialRecord> {
                 .help("the method reads a clock or keeps state that `reset` forgets to clear"));
             }
         }
+        setup.check()?;
         if pass >= protocol.warmup_passes {
             switches += machine::involuntary_switches() - switches_before;
             passes_ns.push(times_ns);
@@ -306,8 +310,8 @@ fn sum(series: &Series) -> Counter {
 /// Judges the answer of `spec` against the truth at sampled frames.
 ///
 /// # Errors
-/// As [`Setup::new`]. An answer that is wrong for its class is not an error but
-/// a judgement with `wrong` set.
+/// As [`Setup::new`], or when a test calls its pass void. An answer that is wrong
+/// for its class is not an error but a judgement with `wrong` set.
 pub fn judge(spec: &RunSpec, cache: &Path) -> Result<Judgement> {
     if let Some(core) = spec.protocol.pin_core {
         let others = machine::auxiliary_cores(Some(core));

@@ -1,4 +1,4 @@
-//! `frustum`: view-frustum culling of boxes, camera-relative and error-bounded.
+//! `frustum`: view-frustum culling of boxes, in the arithmetic that is asked for.
 //!
 //! The p-/n-vertex test of Greene (1994) and Haines & Wallace (1991): of the eight
 //! corners of a box, the one farthest along a plane's normal decides "outside",
@@ -6,26 +6,32 @@
 //! are switches, and neither changes the answer: `plane_mask` (a plane that the
 //! parent is inside of is not tested again) and `last_plane` (start with the plane
 //! that rejected the node last). Silva (2009) tests a BSP's partition plane
-//! against the corners of the frustum instead: `node_test`.
+//! against the corners of the frustum instead: `node_test`; half-spaces are judged
+//! in guarded f64 whatever the arithmetic.
 //!
 //! What we changed: 8 siblings at once (16 in a list), and a proved guard in place
 //! of an epsilon (`frustum_planes`), so the class is conservative for the scene in
 //! f64 at any distance from the origin. Boxes with NaN or infinite bounds are kept.
-//! The other arithmetics: `frustum_world` (aggressive), `frustum_double`, `frustum_fixed`.
+//! The arithmetic is a choice between six [`PlaneTest`]s; of `f32_world` alone the
+//! class is aggressive.
 
-use super::frustum_double::DoublePlanes;
-use super::frustum_fixed::FixedPlanes;
-use super::frustum_numbers::Numbers;
-use super::frustum_planes::{FramePlanes, PlaneMasks, Work};
+use super::frustum_arithmetic::{Ask, PlaneTest, all, bits};
+use super::frustum_exact::Exact;
+use super::frustum_f64::Double;
+use super::frustum_filtered::Filtered;
+use super::frustum_fixed::Fixed;
+use super::frustum_planes::PlaneMasks;
+use super::frustum_relative::Relative;
+pub use super::frustum_relative::{Kernels, kernels};
 use super::frustum_volume::Volume;
-use super::frustum_world::WorldPlanes;
+use super::frustum_world::World;
 use super::*;
-use crate::hierarchy::{BoundsBlock, HalfSpace, LANES, NONE};
+use crate::hierarchy::{HalfSpace, LANES, NONE};
 use crate::registry::{Default as Allowed, Param};
 
 pub const ENTRY: Entry<dyn Test> = Entry {
     name: "frustum",
-    about: "boxes against the view frustum, f32 relative to the camera with a proved error bound",
+    about: "boxes against the view frustum; by default f32 relative to the camera with a proved error bound",
     revision: 1,
     params: &[
         ARITHMETIC,
@@ -46,14 +52,19 @@ pub const ENTRY: Entry<dyn Test> = Entry {
         },
     ],
     make: |spec| {
-        let mut test = Frustum::new(
-            NodeTest::named(spec.text("node_test")),
-            spec.bool("plane_mask"),
-            spec.bool("last_plane"),
-            kernels()[0],
-        );
-        test.numbers = Numbers::new(arithmetic_of(spec));
-        Box::new(test)
+        let options = Options {
+            node_test: NodeTest::named(spec.text("node_test")),
+            plane_mask: spec.bool("plane_mask"),
+            last_plane: spec.bool("last_plane"),
+        };
+        match arithmetic_of(spec) {
+            Arithmetic::F32Relative => Box::new(Frustum::new(options, Relative::new(kernels()[0]))),
+            Arithmetic::F32World => Box::new(Frustum::new(options, World::default())),
+            Arithmetic::F64 => Box::new(Frustum::new(options, Double::default())),
+            Arithmetic::Filtered => Box::new(Frustum::new(options, Filtered::default())),
+            Arithmetic::Exact => Box::new(Frustum::new(options, Exact::default())),
+            Arithmetic::FixedQ16 => Box::new(Frustum::new(options, Fixed::default())),
+        }
     },
 };
 
@@ -76,33 +87,12 @@ impl NodeTest {
     }
 }
 
-type BlockKernel = fn(&FramePlanes, &BoundsBlock, u8, bool, &mut PlaneMasks);
-type FlatKernel = fn(&FramePlanes, &[BoundsBlock], &[u8], &mut [u8]) -> Work;
-
-/// One instruction set's pair of kernels; all give the same bits.
+/// The switches of the test.
 #[derive(Debug, Clone, Copy)]
-pub struct Kernels {
-    pub name: &'static str,
-    pub block: BlockKernel,
-    pub flat: FlatKernel,
-}
-
-/// What this processor can run, the widest first, the scalar twin last.
-pub fn kernels() -> Vec<Kernels> {
-    use super::frustum_scalar as scalar;
-    let mut found = Vec::new();
-    #[cfg(target_arch = "x86_64")]
-    {
-        use super::frustum_x86 as x86;
-        if x86::has_avx512() {
-            found.push(Kernels { name: "avx512", block: x86::block_avx2, flat: x86::flat_avx512 });
-        }
-        if x86::has_avx2() {
-            found.push(Kernels { name: "avx2", block: x86::block_avx2, flat: x86::flat_avx2 });
-        }
-    }
-    found.push(Kernels { name: "scalar", block: scalar::block, flat: scalar::flat });
-    found
+pub struct Options {
+    pub node_test: NodeTest,
+    pub plane_mask: bool,
+    pub last_plane: bool,
 }
 
 /// Carry while only half-spaces are tested: they never prove "wholly inside".
@@ -110,13 +100,9 @@ const HALF_SPACE: u8 = 0x80;
 
 /// The test. Columns: the live lanes of root blocks, and with `last_plane` one
 /// byte a plane and block, whose bits are the lanes that the plane rejected last.
-pub struct Frustum {
-    node_test: NodeTest,
-    plane_mask: bool,
-    last_plane: bool,
-    kernels: Kernels,
-    numbers: Numbers,
-    frame: FramePlanes,
+pub struct Frustum<P> {
+    options: Options,
+    boxes: P,
     volume: Volume,
     /// This frame tests half-spaces, boxes.
     with_planes: bool,
@@ -125,15 +111,11 @@ pub struct Frustum {
     last: Vec<[u8; 6]>,
 }
 
-impl Frustum {
-    pub fn new(node_test: NodeTest, plane_mask: bool, last_plane: bool, kernels: Kernels) -> Frustum {
+impl<P: PlaneTest> Frustum<P> {
+    pub fn new(options: Options, boxes: P) -> Frustum<P> {
         Frustum {
-            node_test,
-            plane_mask,
-            last_plane,
-            kernels,
-            numbers: Numbers::Single,
-            frame: FramePlanes::default(),
+            options,
+            boxes,
             volume: Volume::default(),
             with_planes: false,
             with_boxes: true,
@@ -142,44 +124,11 @@ impl Frustum {
         }
     }
 
-    /// What the `wanted` planes say of the `lanes` of a block.
-    #[inline]
-    fn ask(
-        &mut self,
-        bounds: &BoundsBlock,
-        block: usize,
-        wanted: u8,
-        lanes: u8,
-        want_inside: bool,
-        masks: &mut PlaneMasks,
-        tally: &mut Tally,
-    ) {
-        match &mut self.numbers {
-            Numbers::Single => (self.kernels.block)(&self.frame, bounds, wanted, want_inside, masks),
-            Numbers::World { planes, boxes } => planes.block(&boxes[block], wanted, masks),
-            Numbers::Double { level, planes } => {
-                planes.block(*level, &self.frame, bounds, wanted, lanes, masks, tally);
-            }
-            Numbers::Fixed { planes, unfit } => {
-                *unfit += u64::from(planes.block(bounds, wanted, lanes, masks).count_ones());
-            }
-        }
-    }
-
-    /// Lanes of `alive` that no plane of `wanted` rejects, in index order.
-    fn in_order(
-        &mut self,
-        bounds: &BoundsBlock,
-        block: usize,
-        wanted: u8,
-        alive: u8,
-        want_inside: bool,
-        masks: &mut PlaneMasks,
-        tally: &mut Tally,
-    ) -> u8 {
-        self.ask(bounds, block, wanted, alive, want_inside, masks, tally);
-        let mut alive = alive;
-        for k in bits(wanted) {
+    /// Lanes that no plane rejects, in index order.
+    fn in_order(&mut self, hierarchy: &Hierarchy, ask: Ask, masks: &mut PlaneMasks, tally: &mut Tally) -> u8 {
+        self.boxes.block(hierarchy, &ask, masks, tally);
+        let mut alive = ask.lanes;
+        for k in bits(ask.planes) {
             tally.plane_tests += u64::from(alive.count_ones());
             alive &= !masks.outside[k];
         }
@@ -187,21 +136,14 @@ impl Frustum {
     }
 
     /// The same, each lane starting with the plane that rejected it last.
-    fn last_first(
-        &mut self,
-        bounds: &BoundsBlock,
-        block: usize,
-        wanted: u8,
-        alive: u8,
-        want_inside: bool,
-        masks: &mut PlaneMasks,
-        tally: &mut Tally,
-    ) -> u8 {
-        let mut last = self.last[block];
-        let first = bits(wanted).filter(|k| last[*k] & alive != 0).fold(0, |m, k| m | 1 << k);
-        let mut alive = alive;
+    fn last_first(&mut self, hierarchy: &Hierarchy, ask: Ask, masks: &mut PlaneMasks, tally: &mut Tally) -> u8 {
+        let last = &mut self.last[ask.block as usize];
+        let mut alive = ask.lanes;
+        let first = bits(ask.planes).filter(|k| last[*k] & alive != 0).fold(0, |m, k| m | 1 << k);
         if first != 0 {
-            self.ask(bounds, block, first, alive, want_inside, masks, tally);
+            // A lane's own last plane need not be the first of these.
+            let ask = Ask { planes: first, until_rejected: false, ..ask };
+            self.boxes.block(hierarchy, &ask, masks, tally);
             for k in bits(first) {
                 tally.plane_tests += u64::from((alive & last[k]).count_ones());
                 alive &= !(masks.outside[k] & last[k]);
@@ -210,8 +152,8 @@ impl Frustum {
                 return 0;
             }
         }
-        self.ask(bounds, block, wanted & !first, alive, want_inside, masks, tally);
-        for k in bits(wanted) {
+        self.boxes.block(hierarchy, &Ask { planes: ask.planes & !first, lanes: alive, ..ask }, masks, tally);
+        for k in bits(ask.planes) {
             let tested = alive & !last[k];
             tally.plane_tests += u64::from(tested.count_ones());
             let rejected = tested & masks.outside[k];
@@ -221,7 +163,6 @@ impl Frustum {
                 last[k] |= rejected;
             }
         }
-        self.last[block] = last;
         alive
     }
 
@@ -239,12 +180,9 @@ impl Frustum {
     }
 }
 
-impl Test for Frustum {
+impl<P: PlaneTest> Test for Frustum<P> {
     fn class(&self) -> Class {
-        match self.numbers {
-            Numbers::World { .. } => Class::Aggressive,
-            _ => Class::Conservative,
-        }
+        P::CLASS
     }
 
     fn removes(&self) -> Removes {
@@ -253,50 +191,26 @@ impl Test for Frustum {
 
     fn prepare(&mut self, _scene: &Scene, hierarchy: &Hierarchy) -> usize {
         self.live = hierarchy.links[..hierarchy.root_blocks as usize].iter().map(|l| l.live).collect();
-        self.last = if self.last_plane { vec![[0; 6]; hierarchy.links.len()] } else { Vec::new() };
-        let mut bytes = size_of_val(&self.live[..]) + size_of_val(&self.last[..]);
-        if let Numbers::World { boxes, .. } = &mut self.numbers {
-            *boxes = frustum_world::column(hierarchy);
-            bytes += size_of_val(&boxes[..]);
-        }
-        bytes
-    }
-
-    fn failure(&self) -> Option<String> {
-        match self.numbers {
-            Numbers::Fixed { unfit, .. } if unfit > 0 => Some(format!(
-                "fixed_q16 reaches {} m from the camera, and {unfit} boxes or planes lay beyond: \
-                 scale the scene down, or use another arithmetic",
-                crate::math::fixed::REACH_M
-            )),
-            _ => None,
-        }
+        self.last = if self.options.last_plane { vec![[0; 6]; hierarchy.links.len()] } else { Vec::new() };
+        self.boxes.prepare(hierarchy) + size_of_val(&self.live[..]) + size_of_val(&self.last[..])
     }
 
     fn reset(&mut self) {
         self.last.fill([0; 6]);
-        if let Numbers::Fixed { unfit, .. } = &mut self.numbers {
-            *unfit = 0;
-        }
+        self.boxes.reset();
     }
 
     fn begin(&mut self, view: &View, hierarchy: &Hierarchy) {
-        self.frame = FramePlanes::new(view, hierarchy.origin);
-        match &mut self.numbers {
-            Numbers::Single => {}
-            Numbers::World { planes, .. } => *planes = WorldPlanes::new(view),
-            Numbers::Double { planes, .. } => *planes = DoublePlanes::new(view, hierarchy.origin),
-            Numbers::Fixed { planes, .. } => *planes = FixedPlanes::new(view, hierarchy.origin),
-        }
-        self.with_planes = self.node_test != NodeTest::Box && hierarchy.half_spaces.is_some();
-        self.with_boxes = self.node_test != NodeTest::Plane || !self.with_planes;
+        self.boxes.begin(view, hierarchy);
+        self.with_planes = self.options.node_test != NodeTest::Box && hierarchy.half_spaces.is_some();
+        self.with_boxes = self.options.node_test != NodeTest::Plane || !self.with_planes;
         if self.with_planes {
             self.volume = Volume::new(view, hierarchy.origin);
         }
     }
 
     fn initial_carry(&self) -> u8 {
-        if self.with_boxes { self.frame.all() } else { HALF_SPACE }
+        if self.with_boxes { all(self.boxes.planes()) } else { HALF_SPACE }
     }
 
     fn judge(&mut self, hierarchy: &Hierarchy, block: u32, live: u8, carry: u8, tally: &mut Tally) -> Verdict {
@@ -305,15 +219,15 @@ impl Test for Frustum {
         let mut carries = [HALF_SPACE; LANES];
         if self.with_boxes {
             let mut masks = PlaneMasks::default();
-            let bounds = &hierarchy.bounds[block as usize];
             // Nobody inherits what a block of leaves is inside of.
-            let want_inside = hierarchy.links[block as usize].child.iter().any(|c| *c != NONE);
-            alive = if self.last_plane {
-                self.last_first(bounds, block as usize, carry, alive, want_inside, &mut masks, tally)
+            let inside = hierarchy.links[block as usize].child.iter().any(|c| *c != NONE);
+            let ask = Ask { block, lanes: live, planes: carry, inside, until_rejected: true };
+            alive = if self.options.last_plane {
+                self.last_first(hierarchy, ask, &mut masks, tally)
             } else {
-                self.in_order(bounds, block as usize, carry, alive, want_inside, &mut masks, tally)
+                self.in_order(hierarchy, ask, &mut masks, tally)
             };
-            carries = planes_left(&masks, carry, self.plane_mask);
+            carries = planes_left(&masks, carry, self.options.plane_mask);
         }
         if let (true, Some(column)) = (self.with_planes, &hierarchy.half_spaces) {
             alive = self.half_spaces(column, block, alive, tally);
@@ -322,24 +236,17 @@ impl Test for Frustum {
     }
 
     fn judge_flat(&mut self, hierarchy: &Hierarchy, outside: &mut [u8], tally: &mut Tally) {
-        if self.last_plane || self.with_planes || !matches!(self.numbers, Numbers::Single) {
+        if self.options.last_plane || self.with_planes {
             return super::judge_flat_by_block(self, hierarchy, outside, tally);
         }
-        let bounds = &hierarchy.bounds[..outside.len()];
-        let work = (self.kernels.flat)(&self.frame, bounds, &self.live, outside);
+        let work = self.boxes.flat(hierarchy, &self.live, outside, tally);
         tally.lane_tests += work.lanes;
         tally.plane_tests += work.planes;
     }
-}
 
-/// Indices of the set bits, ascending.
-fn bits(mask: u8) -> impl Iterator<Item = usize> {
-    let mut mask = mask;
-    std::iter::from_fn(move || {
-        let k = (mask != 0).then_some(mask.trailing_zeros() as usize);
-        mask &= mask.wrapping_sub(1);
-        k
-    })
+    fn failure(&self) -> Option<String> {
+        self.boxes.failure()
+    }
 }
 
 /// Carry of each lane: the wanted planes that it is not inside of. Without

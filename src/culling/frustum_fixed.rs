@@ -1,95 +1,203 @@
-//! `frustum` in fixed point: boxes relative to the camera in Q15.16, normals with 28
-//! fraction bits, sums exact in i64. Conservative.
+//! `fixed_q16`: the frustum test in whole numbers, after Silva (2009), who names
+//! fixed point as the way to processors without a floating-point unit. Class conservative.
 //!
-//! # Proof
-//! A bound `c - e` is quantised outward, so the quantised box holds the box. With
-//! `|n^ - n| <= 2^-29` a component, `n.a` differs from `n^.a` by at most
-//! `2^-29 sum |a_i|`: half a quantum of the product for each quantum of place, and
-//! that is added to the side that keeps. The offset is rounded up (outside) or down
-//! (inside). `|n^| <= 2^28`, `|a| < 2^31`: three products are below 2^61, the offset
-//! below 2^59, the slack below 2^33, so nothing overflows in i64.
+//! Bounds are quantised outward once to Q15.16 offsets from the scene's origin. In a
+//! frame the eye is split into whole quanta and a rest of at most half a quantum;
+//! the rest moves into the planes' offsets, as in [`super::frustum_planes`]. Corners relative to
+//! the eye are differences of whole numbers, and plane sums are exact in 64 bits
+//! ([`FixedPlane`]). The errors are those of entry into fixed point alone:
 //!
-//! Facts H.1 (whole numbers only after quantisation), H.2 (moving eye and scene by
-//! whole quanta changes nothing) and H.3 (a bound out of reach is reported, and its
-//! box kept).
+//! - bounds: outward, so corners move outward by less than a quantum, 15 µm;
+//! - normals: half a unit of 2^-28 a component, at most `sum |a_i| / 2` in units of the
+//!   value (0.1 mm at 32 km), which [`fixed::guard`] adds;
+//! - offsets: f64 errors and units of 2^-44 m, in `d_out` and `d_in`.
+//!
+//! Therefore `value(p-vertex, d_out) < -guard` proves "outside" and
+//! `value(n-vertex, d_in) > guard` "inside". Each is monotone in the corner, so
+//! accelerations change nothing. Only whole numbers are compared, so answers
+//! are the same on every machine (H.1), and moving scene and eye by the same whole
+//! quanta changes none (H.2).
+//!
+//! A finite box that reaches farther than 32 km from the eye (or the origin) has no
+//! Q15.16 corner: it is kept, and [`PlaneTest::failure`] makes the run fail (H.3). Boxes
+//! with a NaN or infinite bound are kept without a word (B5.4).
 
-use super::frustum_planes::{PlaneMasks, two_diff};
-use crate::hierarchy::{BoundsBlock, LANES};
-use crate::math::{DVec3, View, fixed};
+use super::frustum_arithmetic::{Ask, PlaneTest, bits};
+use super::frustum_f64::corners;
+use super::frustum_planes::{MAX_PLANES, PlaneMasks, two_diff};
+use super::{Class, Tally};
+use crate::hierarchy::{BoundsBlock, Hierarchy, LANES};
+use crate::math::fixed::{self, FixedPlane, FixedPoint};
+use crate::math::{DVec3, View};
 
-#[derive(Debug, Clone, Copy, Default)]
-struct FixedPlane {
-    normal: [i32; 3],
-    /// Offset rounded up and down.
-    up: i64,
-    down: i64,
+/// Bounds of 8 siblings in quanta from the origin, outward.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C, align(64))]
+pub struct FixedBlock {
+    /// `lo x, lo y, lo z, hi x, hi y, hi z`.
+    pub rows: [[i32; LANES]; 6],
+    /// Lanes with finite bounds that do not fit.
+    pub unfit: u8,
+    /// Lanes with a NaN or infinite bound.
+    pub unsound: u8,
 }
 
-#[derive(Debug, Clone, Default)]
+impl FixedBlock {
+    pub fn new(bounds: &BoundsBlock) -> FixedBlock {
+        let mut out = FixedBlock { rows: [[0; LANES]; 6], unfit: 0, unsound: 0 };
+        for lane in 0..LANES {
+            let b = bounds.get(lane);
+            if !(b.lo.is_finite() && b.hi.is_finite()) {
+                out.unsound |= 1 << lane;
+                continue;
+            }
+            for axis in 0..3 {
+                match (fixed::floor(b.lo[axis]), fixed::ceil(b.hi[axis])) {
+                    (Some(lo), Some(hi)) => (out.rows[axis][lane], out.rows[axis + 3][lane]) = (lo, hi),
+                    _ => out.unfit |= 1 << lane,
+                }
+            }
+        }
+        out
+    }
+}
+
+/// All planes of a frame.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct FixedPlanes {
-    /// `None`: the plane's offset is out of reach, so it can say nothing.
-    planes: Vec<Option<FixedPlane>>,
-    head: DVec3,
-    rest: DVec3,
+    /// The eye in quanta from the origin.
+    pub eye: [i64; 3],
+    pub count: usize,
+    pub planes: [FixedPlane; MAX_PLANES],
+    /// Rows that are the p-vertex and the n-vertex.
+    pub p: [[usize; 3]; MAX_PLANES],
+    pub n: [[usize; 3]; MAX_PLANES],
 }
 
 impl FixedPlanes {
     pub fn new(view: &View, origin: DVec3) -> FixedPlanes {
-        let plane = |p: &crate::math::Plane| {
-            let (up, down) = (fixed::product_up(p.offset_m)?, -fixed::product_up(-p.offset_m)?);
-            Some(FixedPlane { normal: p.normal.to_array().map(fixed::direction), up, down })
-        };
-        let mut out = FixedPlanes { planes: view.planes.iter().map(plane).collect(), ..Default::default() };
-        for axis in 0..3 {
-            (out.head[axis], out.rest[axis]) = two_diff(view.eye[axis], origin[axis]);
+        let parts = [0, 1, 2].map(|axis| two_diff(view.eye[axis], origin[axis]));
+        let eye = FixedPoint::new(parts.map(|p| p.0).into(), parts.map(|p| p.1).into());
+        let mut frame = FixedPlanes { eye: eye.quanta, count: view.planes.len(), ..Default::default() };
+        for (k, plane) in view.planes.iter().enumerate() {
+            frame.planes[k] = FixedPlane::new(plane, eye.rest);
+            // By the rounded normal, whose products are summed: where it is 0, either corner will do.
+            (frame.p[k], frame.n[k]) = corners(plane.normal);
         }
-        out
+        frame
     }
+}
 
-    /// Quantised bounds of a lane, lo then hi; `None` out of reach.
-    fn quantised(&self, bounds: &BoundsBlock, lane: usize) -> Option<[i32; 6]> {
-        let mut out = [0; 6];
-        for axis in 0..3 {
-            // In reach, f64 is finer than a quantum by 2^-21; its two roundings are
-            // outdone by a 2^-20th of a quantum.
-            let hair = (-36f64).exp2();
-            let lo = (f64::from(bounds.lo[axis][lane]) - self.head[axis]) - self.rest[axis];
-            let hi = (f64::from(bounds.hi[axis][lane]) - self.head[axis]) - self.rest[axis];
-            out[axis] = fixed::place_down(lo - hair)?;
-            out[axis + 3] = fixed::place_up(hi + hair)?;
+/// Judges 8 boxes against the planes of `wanted`, and returns the lanes that reach beyond 32 km
+/// from the eye, of which the masks say nothing. The twin of the vector kernels.
+pub fn block(frame: &FixedPlanes, bounds: &FixedBlock, wanted: u8, want_inside: bool, out: &mut PlaneMasks) -> u8 {
+    let mut beyond = 0;
+    let boxes: [([i64; 6], i64); LANES] = std::array::from_fn(|lane| {
+        let a: [i64; 6] = std::array::from_fn(|row| i64::from(bounds.rows[row][lane]) - frame.eye[row % 3]);
+        beyond |= u8::from(a.iter().any(|x| i32::try_from(*x).is_err())) << lane;
+        (a, fixed::guard([0, 1, 2].map(|axis| a[axis].abs().max(a[axis + 3].abs()))))
+    });
+    for k in bits(wanted) {
+        let plane = &frame.planes[k];
+        let (mut outside, mut inside) = (0, 0);
+        for lane in bits(!beyond) {
+            let (a, guard) = &boxes[lane];
+            outside |= u8::from(plane.value(frame.p[k].map(|i| a[i]), plane.d_out) < -guard) << lane;
+            inside |= u8::from(want_inside && plane.value(frame.n[k].map(|i| a[i]), plane.d_in) > *guard) << lane;
         }
-        Some(out)
+        out.outside[k] = outside;
+        if want_inside {
+            out.inside[k] = inside;
+        }
     }
+    beyond
+}
 
-    /// As the other kernels. Returns the lanes that do not fit, which are kept.
-    pub fn block(&self, bounds: &BoundsBlock, wanted: u8, lanes: u8, out: &mut PlaneMasks) -> u8 {
-        let mut unfit = 0;
-        let boxes: [Option<[i32; 6]>; LANES] = std::array::from_fn(|lane| match lanes >> lane & 1 {
-            1 => self.quantised(bounds, lane).or_else(|| {
-                unfit |= 1 << lane;
-                None
-            }),
-            _ => None,
+type Kernel = fn(&FixedPlanes, &FixedBlock, u8, bool, &mut PlaneMasks) -> u8;
+
+/// What this processor can run, the widest first, the scalar twin last.
+pub fn kernels() -> Vec<(&'static str, Kernel)> {
+    vec![("scalar", block as Kernel)]
+}
+
+/// The arithmetic `fixed_q16`, with its column of boxes.
+pub struct Fixed {
+    kernel: Kernel,
+    frame: FixedPlanes,
+    bounds: Vec<FixedBlock>,
+    overflow: Option<Overflow>,
+}
+
+/// The first box that did not fit, and how many judgements met one.
+#[derive(Debug, Clone, Copy)]
+struct Overflow {
+    node: u32,
+    distance_m: f64,
+    judgements: u64,
+}
+
+impl Default for Fixed {
+    fn default() -> Fixed {
+        Fixed { kernel: kernels()[0].1, frame: FixedPlanes::default(), bounds: Vec::new(), overflow: None }
+    }
+}
+
+impl Fixed {
+    #[cold]
+    fn report(&mut self, hierarchy: &Hierarchy, block: u32, lanes: u8) {
+        let first = self.overflow.get_or_insert_with(|| {
+            let lane = lanes.trailing_zeros();
+            let b = hierarchy.bounds[block as usize].get(lane as usize);
+            let eye = DVec3::from(self.frame.eye.map(|q| q as f64)) / f64::from(1 << fixed::LENGTH_BITS);
+            let (lo, hi) = (b.lo.as_dvec3(), b.hi.as_dvec3());
+            let reach = [lo - eye, hi - eye, lo, hi].map(|v| v.abs().max_element()).into_iter().fold(0.0, f64::max);
+            Overflow { node: block * LANES as u32 + lane, distance_m: reach, judgements: 0 }
         });
-        for (k, plane) in self.planes.iter().enumerate().filter(|(k, _)| wanted >> k & 1 == 1) {
-            (out.outside[k], out.inside[k]) = (0, 0);
-            let Some(plane) = plane else {
-                unfit |= lanes;
-                continue;
-            };
-            for (lane, quantised) in boxes.iter().enumerate() {
-                let Some(a) = quantised else { continue };
-                let (mut far, mut near) = (plane.up, plane.down);
-                for axis in 0..3 {
-                    let n = plane.normal[axis];
-                    let (p, q) = if n >= 0 { (a[axis + 3], a[axis]) } else { (a[axis], a[axis + 3]) };
-                    far += i64::from(n) * i64::from(p) + (i64::from(p.unsigned_abs()) + 1) / 2;
-                    near += i64::from(n) * i64::from(q) - (i64::from(q.unsigned_abs()) + 1) / 2;
-                }
-                out.outside[k] |= u8::from(far < 0) << lane;
-                out.inside[k] |= u8::from(near > 0) << lane;
+        first.judgements += u64::from(lanes.count_ones());
+    }
+}
+
+impl PlaneTest for Fixed {
+    const CLASS: Class = Class::Conservative;
+
+    fn prepare(&mut self, hierarchy: &Hierarchy) -> usize {
+        self.bounds = hierarchy.bounds.iter().map(FixedBlock::new).collect();
+        size_of_val(&self.bounds[..])
+    }
+
+    fn reset(&mut self) {
+        self.overflow = None;
+    }
+
+    fn begin(&mut self, view: &View, hierarchy: &Hierarchy) {
+        self.frame = FixedPlanes::new(view, hierarchy.origin);
+    }
+
+    fn planes(&self) -> usize {
+        self.frame.count
+    }
+
+    fn block(&mut self, hierarchy: &Hierarchy, ask: &Ask, masks: &mut PlaneMasks, _: &mut Tally) {
+        let bounds = &self.bounds[ask.block as usize];
+        let beyond = (self.kernel)(&self.frame, bounds, ask.planes, ask.inside, masks);
+        let (unfit, unsound) = (beyond & !bounds.unsound | bounds.unfit, bounds.unsound);
+        if unfit | unsound | beyond != 0 {
+            for k in bits(ask.planes) {
+                masks.outside[k] &= !(unfit | unsound);
+                masks.inside[k] &= !(unfit | unsound);
+            }
+            if unfit & ask.lanes != 0 {
+                self.report(hierarchy, ask.block, unfit & ask.lanes);
             }
         }
-        unfit
+    }
+
+    fn failure(&self) -> Option<String> {
+        let Overflow { node, distance_m, judgements } = self.overflow?;
+        Some(format!(
+            "fixed_q16 reaches {:.0} m, but the box of node {node} is {distance_m:.0} m away ({judgements} such \
+             judgements in the pass): choose a smaller `scale` for the scene, or another arithmetic for it",
+            fixed::REACH_M
+        ))
     }
 }

@@ -1,96 +1,133 @@
-//! `frustum` as engines write it: everything in single precision, in world
-//! coordinates, without a guard. **Aggressive**: far from the origin it loses boxes
-//! that are visible, and the lab measures how many.
+//! `f32_world`: the frustum test as most engines write it. Class aggressive.
 //!
-//! Planes are rows of an f32 view-projection matrix (Gribb & Hartmann 2001, read from
-//! public code), boxes the nearest f32 to `origin + offset`, and a box is outside when
-//! its p-vertex has `n.p + d < 0`. The eye cancels in `d` only as well as f32 allows:
-//! the distance error grows as the offset (about `5u |offset|`).
+//! Planes come from the rows of a single-precision world-space view-projection
+//! matrix (Gribb & Hartmann 2001), boxes are single-precision world coordinates,
+//! and the p-vertex is compared with zero, without a guard. The eye, the axes, the
+//! translation `-axis . eye`, the product of the matrices and the sums of their
+//! rows all round to f32. Far from the world's origin the translation and `n . p`
+//! are large and cancel, and each bound was rounded to nearest, not outward: so
+//! boxes that can be seen are lost, a decade more a decade farther out (fact B5.2).
+//!
+//! The projection is the usual right-handed one with depth 0 at the near and 1 at the
+//! far plane. An infinite far plane leaves a row without a normal, which is found
+//! before normalising and stands for "everything is inside" (B1). The same
+//! happens for a far plane that f32 cannot tell from infinity, and up to there the far plane
+//! is where its row says, which is not quite where the camera says.
+//! Boxes with a NaN or infinite bound are made NaN altogether, hence kept (B5.4).
 
-use super::frustum_planes::PlaneMasks;
+use super::frustum_arithmetic::{Ask, PlaneTest};
+use super::frustum_planes::{FramePlanes, Plane32, PlaneMasks};
+use super::{Class, Tally};
 use crate::hierarchy::{BoundsBlock, Hierarchy, LANES};
-use crate::math::{DVec3, Vec3, View};
+use crate::math::{Box32, DVec3, Vec3, View};
 
-/// `n.p + d >= 0` inside.
-#[derive(Debug, Clone, Copy, Default)]
-struct WorldPlane {
-    normal: Vec3,
-    d: f32,
+type Row = [f32; 4];
+
+/// Rows of the world-space view-projection matrix, all in f32.
+pub fn view_projection(view: &View) -> [Row; 4] {
+    let eye = view.eye.as_vec3();
+    let row = |axis: Vec3| [axis.x, axis.y, axis.z, -axis.dot(eye)];
+    let camera =
+        [row(view.right.as_vec3()), row(view.up.as_vec3()), row(-view.forward.as_vec3()), [0.0, 0.0, 0.0, 1.0]];
+    let projection = projection(view);
+    projection.map(|p| std::array::from_fn(|j| (0..4).map(|i| p[i] * camera[i][j]).sum()))
 }
 
-#[derive(Debug, Clone, Default)]
-pub struct WorldPlanes {
-    /// left, right, bottom, top, near, far; `None` where a row has no normal.
-    planes: Vec<Option<WorldPlane>>,
-}
-
-impl WorldPlanes {
-    pub fn new(view: &View) -> WorldPlanes {
-        let (eye, right, up) = (view.eye.as_vec3(), view.right.as_vec3(), view.up.as_vec3());
-        let forward = view.forward.as_vec3();
-        // Rows of the view matrix: (axis, -axis . eye), all in f32.
-        let row = |axis: Vec3, sign: f32| -> [f32; 4] {
-            let a = axis * sign;
-            [a.x, a.y, a.z, -a.dot(eye)]
-        };
-        let (x, y, z) = (row(right, 1.0), row(up, 1.0), row(forward, 1.0));
-        let scale = |r: [f32; 4], s: f32| r.map(|v| v * s);
-        let add = |a: [f32; 4], b: [f32; 4]| [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]];
-        let one = [0.0, 0.0, 0.0, 1.0];
-        let near = view.camera.near_m as f32;
-        // Clip rows: w is the depth (perspective) or 1 (orthographic).
-        let w = if view.is_perspective() { z } else { one };
-        let (cx, cy) = (scale(x, 1.0 / view.half_width as f32), scale(y, 1.0 / view.half_height as f32));
-        let mut rows =
-            vec![add(w, cx), add(w, scale(cx, -1.0)), add(w, cy), add(w, scale(cy, -1.0)), add(z, scale(one, -near))];
-        if let Some(far_m) = view.camera.far_m {
-            rows.push(add(scale(z, -1.0), scale(one, far_m as f32)));
-        }
-        let planes = rows.into_iter().map(|[a, b, c, d]| {
-            let normal = Vec3::new(a, b, c);
-            let length = normal.length();
-            // B1: an infinite far plane gives a row without a normal.
-            (length > 1e-12 * d.abs() && length.is_finite())
-                .then(|| WorldPlane { normal: normal / length, d: d / length })
-        });
-        WorldPlanes { planes: planes.collect() }
-    }
-
-    /// As the guarded kernels: outside and inside lanes of the wanted planes.
-    pub fn block(&self, boxes: &BoundsBlock, wanted: u8, out: &mut PlaneMasks) {
-        for (k, plane) in self.planes.iter().enumerate().filter(|(k, _)| wanted >> k & 1 == 1) {
-            (out.outside[k], out.inside[k]) = (0, 0);
-            let Some(plane) = plane else { continue };
-            for lane in 0..LANES {
-                let mut far = plane.d;
-                let mut near = plane.d;
-                for axis in 0..3 {
-                    let n = plane.normal[axis];
-                    let (lo, hi) = (boxes.lo[axis][lane], boxes.hi[axis][lane]);
-                    let (p, q) = if n >= 0.0 { (hi, lo) } else { (lo, hi) };
-                    far += n * p;
-                    near += n * q;
-                }
-                // NaN is neither.
-                out.outside[k] |= u8::from(far < 0.0) << lane;
-                out.inside[k] |= u8::from(near >= 0.0) << lane;
-            }
-        }
-    }
-}
-
-/// World-space boxes of a hierarchy, rounded to nearest.
-pub fn column(hierarchy: &Hierarchy) -> Vec<BoundsBlock> {
-    let world = |offset: f32, axis: usize, origin: DVec3| (origin[axis] + f64::from(offset)) as f32;
-    let block = |b: &BoundsBlock| {
-        let mut out = *b;
-        for axis in 0..3 {
-            for lane in 0..LANES {
-                out.lo[axis][lane] = world(b.lo[axis][lane], axis, hierarchy.origin);
-                out.hi[axis][lane] = world(b.hi[axis][lane], axis, hierarchy.origin);
-            }
-        }
-        out
+fn projection(view: &View) -> [Row; 4] {
+    let (near, far) = (view.camera.near_m as f32, view.camera.far_m.map(|f| f as f32));
+    let (x, y) = (1.0 / view.half_width as f32, 1.0 / view.half_height as f32);
+    let (depth, w) = match (view.is_perspective(), far) {
+        (true, Some(far)) => ([0.0, 0.0, far / (near - far), near * far / (near - far)], [0.0, 0.0, -1.0, 0.0]),
+        (true, None) => ([0.0, 0.0, -1.0, -near], [0.0, 0.0, -1.0, 0.0]),
+        (false, Some(far)) => ([0.0, 0.0, 1.0 / (near - far), near / (near - far)], [0.0, 0.0, 0.0, 1.0]),
+        // No matrix has this volume: its near plane, by the metre, is all there is of depth.
+        (false, None) => ([0.0, 0.0, -1.0, -near], [0.0, 0.0, 0.0, 1.0]),
     };
-    hierarchy.bounds.iter().map(block).collect()
+    [[x, 0.0, 0.0, 0.0], [0.0, y, 0.0, 0.0], depth, w]
+}
+
+/// The planes in f32 world coordinates, as the kernels read them: an eye of zero,
+/// and no slack.
+pub fn planes(view: &View) -> FramePlanes {
+    let [r0, r1, r2, r3] = view_projection(view);
+    let sum = |a: Row, sign: f32, b: Row| std::array::from_fn::<f32, 4, _>(|i| a[i] + sign * b[i]);
+    let rows = [sum(r3, 1.0, r0), sum(r3, -1.0, r0), sum(r3, 1.0, r1), sum(r3, -1.0, r1), r2, sum(r3, -1.0, r2)];
+    let mut frame = FramePlanes { count: view.planes.len(), ..Default::default() };
+    for (plane, row) in frame.planes[..view.planes.len()].iter_mut().zip(rows) {
+        *plane = plane_of(row);
+    }
+    frame
+}
+
+fn plane_of([x, y, z, d]: Row) -> Plane32 {
+    let normal = Vec3::new(x, y, z);
+    let length = normal.length();
+    let [normal, d] = if length < 1e-12 * d.abs() {
+        return Plane32 { d_out: 1.0, d_in: 1.0, p: [3, 4, 5], n: [0, 1, 2], ..Default::default() };
+    } else {
+        [normal / length, Vec3::splat(d / length)]
+    };
+    let p = [0, 1, 2].map(|axis| if normal[axis] >= 0.0 { axis + 3 } else { axis });
+    let n = [0, 1, 2].map(|axis| 2 * axis + 3 - p[axis]);
+    Plane32 { normal: normal.to_array(), d_out: d.x, d_in: d.x, p, n }
+}
+
+/// A box in world coordinates, each bound rounded to nearest; all NaN if one is not finite.
+pub fn world_box(b: &Box32, origin: DVec3) -> Box32 {
+    let place = |bound: Vec3| (bound.as_dvec3() + origin).as_vec3();
+    let (lo, hi) = (place(b.lo), place(b.hi));
+    if lo.is_finite() && hi.is_finite() { Box32 { lo, hi } } else { Box32 { lo: Vec3::NAN, hi: Vec3::NAN } }
+}
+
+/// Judges 8 boxes; see `frustum_scalar::block`.
+pub fn block(frame: &FramePlanes, bounds: &BoundsBlock, wanted: u8, want_inside: bool, out: &mut PlaneMasks) {
+    for k in super::frustum_arithmetic::bits(wanted) {
+        let plane = &frame.planes[k];
+        let (mut outside, mut inside) = (0, 0);
+        for lane in 0..LANES {
+            let b = bounds.get(lane);
+            let a = [b.lo.x, b.lo.y, b.lo.z, b.hi.x, b.hi.y, b.hi.z];
+            outside |= u8::from(super::frustum_scalar::value(plane, &a, &plane.p, plane.d_out) < 0.0) << lane;
+            if want_inside {
+                inside |= u8::from(super::frustum_scalar::value(plane, &a, &plane.n, plane.d_in) > 0.0) << lane;
+            }
+        }
+        out.outside[k] = outside;
+        if want_inside {
+            out.inside[k] = inside;
+        }
+    }
+}
+
+/// The arithmetic `f32_world`, with its column of boxes.
+#[derive(Default)]
+pub struct World {
+    frame: FramePlanes,
+    bounds: Vec<BoundsBlock>,
+}
+
+impl PlaneTest for World {
+    const CLASS: Class = Class::Aggressive;
+
+    fn prepare(&mut self, hierarchy: &Hierarchy) -> usize {
+        let block = |local: &BoundsBlock| {
+            let mut world = BoundsBlock::EMPTY;
+            (0..LANES).for_each(|lane| world.set(lane, world_box(&local.get(lane), hierarchy.origin)));
+            world
+        };
+        self.bounds = hierarchy.bounds.iter().map(block).collect();
+        size_of_val(&self.bounds[..])
+    }
+
+    fn begin(&mut self, view: &View, _: &Hierarchy) {
+        self.frame = planes(view);
+    }
+
+    fn planes(&self) -> usize {
+        self.frame.count
+    }
+
+    fn block(&mut self, _: &Hierarchy, ask: &Ask, masks: &mut PlaneMasks, _: &mut Tally) {
+        block(&self.frame, &self.bounds[ask.block as usize], ask.planes, ask.inside, masks);
+    }
 }

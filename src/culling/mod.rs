@@ -12,10 +12,13 @@ pub mod facing_kernels;
 pub mod facing_x86;
 pub mod flat;
 pub mod frustum;
-pub mod frustum_double;
+pub mod frustum_arithmetic;
+pub mod frustum_exact;
+pub mod frustum_f64;
+pub mod frustum_filtered;
 pub mod frustum_fixed;
-mod frustum_numbers;
 pub mod frustum_planes;
+pub mod frustum_relative;
 pub mod frustum_scalar;
 pub mod frustum_volume;
 pub mod frustum_world;
@@ -114,8 +117,8 @@ pub trait Test: Send {
     fn filter(&mut self, hierarchy: &Hierarchy, list: &mut DrawList, tally: &mut Tally) {
         let _ = (hierarchy, list, tally);
     }
-    /// Why the answers since [`Test::reset`] must not be used, if so: a number did not
-    /// fit its arithmetic, say; the sentence says what to do, and the run fails.
+    /// Why the passes since the last [`Test::reset`] are void, as a sentence that says
+    /// what to do, if they are: an overflow of fixed point, say. The run then fails.
     fn failure(&self) -> Option<String> {
         None
     }

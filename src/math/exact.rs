@@ -1,4 +1,4 @@
-//! Signs of small determinants in whole numbers of unbounded length.
+//! Signs of small determinants, and sides of planes, in whole numbers of unbounded length.
 //!
 //! Every finite f64 is a whole number times a power of two, so a determinant of
 //! differences of f64 is one too: no rounding, no underflow, no overflow. Slow,
@@ -60,6 +60,19 @@ impl Whole {
             words[i + o.words.len()] = carry as u32;
         }
         Whole { negative: self.negative != o.negative, words }.trimmed()
+    }
+
+    /// Times `2^by`.
+    fn shifted(&self, by: usize) -> Whole {
+        let mut words = vec![0; by / 32];
+        let mut carry = 0;
+        for word in &self.words {
+            let wide = u64::from(*word) << (by % 32);
+            words.push(wide as u32 | carry);
+            carry = (wide >> 32) as u32;
+        }
+        words.push(carry);
+        Whole { negative: self.negative, words }.trimmed()
     }
 
     fn sign(&self) -> Ordering {
@@ -125,20 +138,19 @@ pub fn sign_along(v0: DVec3, v1: DVec3, v2: DVec3, direction: DVec3) -> Ordering
     sign_of_rows(&from_v0(v1), &from_v0(v2), &[0, 1, 2].map(|k| Whole::of(direction[k], unit)))
 }
 
-/// The sign of `normal . (origin + corner - eye) + offset`.
-///
-/// # Panics
-/// If a number is not finite.
-pub fn sign_of_plane(normal: DVec3, corner: DVec3, origin: DVec3, eye: DVec3, offset: f64) -> Ordering {
-    let unit = common_unit(&[corner, origin, eye]);
-    let normal_unit = common_unit(&[normal]);
-    // The product of a whole normal and a whole place has the unit of both, which the
-    // offset must be a multiple of too: a finer offset refines the places.
-    let offset_unit = if offset == 0.0 { i32::MAX } else { decompose(offset).1 };
-    let unit = unit.min(offset_unit.saturating_sub(normal_unit));
-    let place = |k: usize| Whole::of(origin[k], unit).plus(&Whole::of(corner[k], unit)).minus(&Whole::of(eye[k], unit));
-    let sum = Whole::of(offset, unit + normal_unit);
-    (0..3).fold(sum, |sum, k| sum.plus(&Whole::of(normal[k], normal_unit).times(&place(k)))).sign()
+/// The sign of `normal . (origin + offset - eye) + d`: on which side of a plane that
+/// is given relative to the eye a point lies that is given relative to an origin.
+pub fn sign_of_plane(normal: DVec3, d: f64, origin: DVec3, offset: DVec3, eye: DVec3) -> Ordering {
+    let (unit, unit_n) = (common_unit(&[origin, offset, eye]), common_unit(&[normal]));
+    // In units of both, of which `d` need not be a multiple.
+    let (unit_sum, unit_d) = (unit + unit_n, common_unit(&[DVec3::splat(d)]));
+    let common = if d == 0.0 { unit_sum } else { unit_sum.min(unit_d) };
+    let mut sum = Whole::of(d, common);
+    for k in 0..3 {
+        let relative = Whole::of(origin[k], unit).plus(&Whole::of(offset[k], unit)).minus(&Whole::of(eye[k], unit));
+        sum = sum.plus(&relative.times(&Whole::of(normal[k], unit_n)).shifted((unit_sum - common) as usize));
+    }
+    sum.sign()
 }
 
 fn common_unit(points: &[DVec3]) -> i32 {
@@ -154,38 +166,6 @@ fn sign_of_rows(a: &[Whole; 3], b: &[Whole; 3], c: &[Whole; 3]) -> Ordering {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-
-    #[test]
-    fn an_offset_finer_than_all_else_still_decides() {
-        for (offset, expected) in [(-1.0, Ordering::Less), (0.0, Ordering::Equal), (5e-324, Ordering::Greater)] {
-            assert_eq!(sign_of_plane(DVec3::X, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, offset), expected);
-            let far = DVec3::new(1e8, 0.0, 0.0);
-            assert_eq!(sign_of_plane(DVec3::new(0.6, 0.0, 0.8), DVec3::ZERO, far, far, offset), expected);
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn plane_signs_agree_with_i128(v in proptest::array::uniform12(-(1i64 << 40)..(1i64 << 40)), o in -3i64..3) {
-            let unit = (-20f64).exp2();
-            let point = |i: usize| DVec3::new(v[i] as f64, v[i + 1] as f64, v[i + 2] as f64) * unit;
-            let sum: i128 = (0..3)
-                .map(|k| i128::from(v[k]) * (i128::from(v[k + 3]) + i128::from(v[k + 6]) - i128::from(v[k + 9])))
-                .sum();
-            let found = sign_of_plane(point(0), point(3), point(6), point(9), 0.0);
-            prop_assert_eq!(found, sum.cmp(&0));
-            // On the plane, and a hair off it.
-            let offset = -(sum as f64);
-            if offset as i128 == -sum {
-                let hair = o as f64 * unit * unit;
-                let found = sign_of_plane(point(0), point(3), point(6), point(9), offset * unit * unit);
-                prop_assert_eq!(found, Ordering::Equal);
-                let beside = offset * unit * unit + hair;
-                let exact = (sum + (beside / (unit * unit)) as i128).cmp(&0);
-                prop_assert_eq!(sign_of_plane(point(0), point(3), point(6), point(9), beside), exact);
-            }
-        }
-    }
 
     proptest! {
         #[test]
@@ -210,6 +190,22 @@ mod tests {
             let det = d(0, 0) * (d(1, 1) * d(2, 2) - d(1, 2) * d(2, 1)) - d(0, 1) * (d(1, 0) * d(2, 2) - d(1, 2) * d(2, 0))
                 + d(0, 2) * (d(1, 0) * d(2, 1) - d(1, 1) * d(2, 0));
             prop_assert_eq!(sign_of_differences(point(0), point(3), point(6), point(9)), det.cmp(&0));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_side_of_a_plane_is_that_of_small_whole_numbers(
+            m in proptest::array::uniform12(-1000i64..1000), d in -3_000_000i64..3_000_000, shift in 0usize..70,
+        ) {
+            // The offset in units far below, and far above, those of the products.
+            let point = |i: usize| DVec3::new(m[i] as f64, m[i + 1] as f64, m[i + 2] as f64);
+            let dot: i64 = (0..3).map(|k| m[k] * (m[3 + k] + m[6 + k] - m[9 + k])).sum();
+            let small = libm::exp2(-(shift as f64));
+            let want = ((i128::from(dot) << shift) + i128::from(d)).cmp(&0);
+            prop_assert_eq!(sign_of_plane(point(0), d as f64 * small, point(3), point(6), point(9)), want);
+            let want = (i128::from(dot) + (i128::from(d) << shift)).cmp(&0);
+            prop_assert_eq!(sign_of_plane(point(0), d as f64 / small, point(3), point(6), point(9)), want);
         }
     }
 

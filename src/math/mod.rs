@@ -4,6 +4,7 @@ pub mod aabb;
 pub mod arithmetic;
 pub mod camera;
 pub mod exact;
+pub mod expansion;
 pub mod fixed;
 pub mod predicates;
 

@@ -1,6 +1,7 @@
-//! Culling tests and walks: facts B2-B5, C1, C3 and C4 of the algorithm notes, and
+//! Culling tests and walks: facts B2-B5, C1, C3, C4 and H of the algorithm notes, and
 //! the agreement of all kernels, accelerations and walks.
 
+mod arithmetics;
 mod back_face;
 mod build;
 mod cones;

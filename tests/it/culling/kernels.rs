@@ -6,7 +6,7 @@ use cullmark::culling::frustum_planes::{FramePlanes, PlaneMasks};
 use cullmark::math::{Box32, Camera, DVec3, Pose, Projection, Vec3, View};
 
 /// Random boxes, then boxes that touch planes, then everything that is not a box.
-fn nasty_boxes(rng: &mut Rng, count: usize) -> Vec<Box32> {
+pub fn nasty_boxes(rng: &mut Rng, count: usize) -> Vec<Box32> {
     let special = [
         0.0,
         -0.0,

@@ -2,9 +2,9 @@
 
 use super::build::{Rng, camera, list, tree, view_along};
 use crate::common::soup;
-use cullmark::culling::{DrawList, Tally, Test, cull, make_tests, make_walk};
+use cullmark::culling::{DrawList, Tally, Test, cull, make_tests_in, make_walk};
 use cullmark::hierarchy::{HalfSpace, Hierarchy, NONE};
-use cullmark::math::{Camera, DVec3, Projection, View};
+use cullmark::math::{Arithmetic, Camera, DVec3, Projection, View};
 use cullmark::registry::{Spec, parse_sum};
 use cullmark::scene::Scene;
 
@@ -17,7 +17,17 @@ pub struct Method<'a> {
 
 impl<'a> Method<'a> {
     pub fn new(scene: &Scene, hierarchy: &'a Hierarchy, culling: &str, walk: &str) -> Method<'a> {
-        let (mut tests, _) = make_tests(&parse_sum(culling).unwrap()).unwrap();
+        Method::in_arithmetic(scene, hierarchy, culling, walk, Arithmetic::default())
+    }
+
+    pub fn in_arithmetic(
+        scene: &Scene,
+        hierarchy: &'a Hierarchy,
+        culling: &str,
+        walk: &str,
+        arithmetic: Arithmetic,
+    ) -> Method<'a> {
+        let (mut tests, _) = make_tests_in(&parse_sum(culling).unwrap(), arithmetic).unwrap();
         for t in &mut tests {
             t.prepare(scene, hierarchy);
         }
