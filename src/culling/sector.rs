@@ -227,7 +227,7 @@ mod tests {
                             let (a, b) = (cone[k], cone[(k + 1) % 3]);
                             let out = DVec3::new(b.y - a.y, a.x - b.x, 0.0);
                             let inner = out.dot(cone[(k + 2) % 3] - a).signum();
-                            assert!(out.dot(n - a) * inner >= 0.0, "{sectors} {s} {i}");
+                            assert!(out.dot(n - a) * inner >= -1e-15, "{sectors} {s} {i}");
                         }
                         assert!(cone[0].z < t && t < cone[3].z);
                     }
