@@ -94,8 +94,9 @@ impl FixedEye {
             FixedEye::Direction(d) => *d,
             _ => a,
         };
-        let (value, bound) = determinant(p, r, a);
-        if value > bound { Fixed::Back } else { Fixed::Kept }
+        let (n, value) = determinant(p, r, a);
+        // Half of all triangles are settled without a bound.
+        if value > 0 && value > bound(p, r, a, n) { Fixed::Back } else { Fixed::Kept }
     }
 }
 
@@ -105,22 +106,30 @@ fn minus(a: &[i64; 3], b: &[i64; 3]) -> Option<[i64; 3]> {
     d.iter().all(|x| i32::try_from(*x).is_ok()).then_some(d)
 }
 
-/// `(p x r) . a` and the most by which it may be off.
-fn determinant(p: [i64; 3], r: [i64; 3], a: [i64; 3]) -> (i128, i128) {
-    let small = p.iter().chain(&r).all(|x| x.abs() < 1 << 20);
-    let (mut value, mut bound) = (0i128, 0i128);
-    for (i, a) in a.into_iter().enumerate() {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        let n = if small {
-            i128::from(p[j] * r[k] - p[k] * r[j])
-        } else {
-            i128::from(p[j]) * i128::from(r[k]) - i128::from(p[k]) * i128::from(r[j])
-        };
-        let n_off = p[j].abs() + r[k].abs() + p[k].abs() + r[j].abs() + 2;
-        value += n * i128::from(a);
-        bound += i128::from(n_off) * i128::from(a.abs() + 1) + n.abs();
+/// `n = p x r` and `n . a`.
+fn determinant(p: [i64; 3], r: [i64; 3], a: [i64; 3]) -> ([i128; 3], i128) {
+    let axes = [(1, 2), (2, 0), (0, 1)];
+    let small = p.iter().chain(&r).fold(0, |m, x| m | x.unsigned_abs()) < 1 << 20;
+    if small {
+        let n = axes.map(|(j, k)| p[j] * r[k] - p[k] * r[j]);
+        let term = |i: usize| i128::from(n[i]) * i128::from(a[i]);
+        (n.map(i128::from), term(0) + term(1) + term(2))
+    } else {
+        let wide = |x: i64, y: i64| i128::from(x) * i128::from(y);
+        let n = axes.map(|(j, k)| wide(p[j], r[k]) - wide(p[k], r[j]));
+        (n, n[0] * i128::from(a[0]) + n[1] * i128::from(a[1]) + n[2] * i128::from(a[2]))
     }
-    (value, bound + (bound >> 7) + 1)
+}
+
+/// The most by which that may be off.
+fn bound(p: [i64; 3], r: [i64; 3], a: [i64; 3], n: [i128; 3]) -> i128 {
+    let (p, r) = (p.map(i64::abs), r.map(i64::abs));
+    let all: i64 = p.iter().chain(&r).sum::<i64>() + 2;
+    let off = (0..3).fold(0, |sum, i| {
+        let n_off = all - p[i] - r[i];
+        sum + i128::from(n_off) * i128::from(a[i].abs() + 1) + n[i].abs()
+    });
+    off + (off >> 7) + 1
 }
 
 #[cfg(test)]
@@ -176,7 +185,10 @@ mod tests {
         let wide = |i: usize, j: usize| i128::from(p[i]) * i128::from(r[j]) - i128::from(p[j]) * i128::from(r[i]);
         let a = [i64::from(i32::MAX), i64::from(i32::MIN), 9];
         let want = wide(1, 2) * i128::from(a[0]) + wide(2, 0) * i128::from(a[1]) + wide(0, 1) * i128::from(a[2]);
-        assert_eq!(determinant(p, r, a).0, want);
+        assert_eq!(determinant(p, r, a).1, want);
+        let halves = [p, r].map(|v| v.map(|x| x / 2));
+        let [n, _] = [determinant(halves[0], halves[1], a).0, [0; 3]];
+        assert_eq!(n[2], i128::from(halves[0][0] * halves[1][1] - halves[0][1] * halves[1][0]));
     }
 
     // H.3: beyond 32,768 m there is an error, never a wrap.

@@ -118,24 +118,24 @@ mod tests {
         for _ in 0..200 {
             let mut bounds = BoundsBlock::EMPTY;
             let mut masks = [[0u64; LANES]; 1];
-            for lane in 0..LANES {
+            for (lane, mask) in masks[0].iter_mut().enumerate() {
                 let (centre, half) = (vector(20.0), vector(2.0).abs());
                 bounds.set(lane, Box32 { lo: centre - half, hi: centre + half });
                 // Some neighbouring cells.
-                masks[0][lane] = 0b1011 << (centre.x.abs() * 2.4) as u32;
+                *mask = 0b1011 << (centre.x.abs() * 2.4) as u32;
             }
             let eye = vector(5.0).as_dvec3();
             let mut local = Local::new(cells);
             local.begin(&View::new(&Camera::default(), &Pose { eye, forward: DVec3::X, up: DVec3::Z }), DVec3::ZERO);
             let outside = local.outside(&bounds, &masks, 0x7f);
-            for lane in 0..LANES {
+            for (lane, mask) in masks[0].iter().enumerate() {
                 let b = bounds.get(lane);
                 let (lo, hi) = (b.lo.as_dvec3() - eye, b.hi.as_dvec3() - eye);
                 let far = (lo.abs() + hi.abs()).element_sum();
                 let guard = GUARD * far + (eye.abs().max_element() + far) * ULPS;
                 let ray = |i: usize| DVec3::from_array([0, 1, 2].map(|k| if i >> k & 1 == 1 { hi[k] } else { lo[k] }));
                 let away = |q: &DVec3| (0..8).all(|i| q.dot(ray(i)) >= guard * q.length());
-                let all = (0..64).filter(|c| masks[0][lane] >> c & 1 == 1).all(|c| cells.corners(c).iter().all(away));
+                let all = (0..64).filter(|c| mask >> c & 1 == 1).all(|c| cells.corners(c).iter().all(away));
                 assert_eq!(outside >> lane & 1 == 1, all && lane < 7);
                 found += u32::from(all);
             }

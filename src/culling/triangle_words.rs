@@ -43,7 +43,7 @@ impl DrawList {
                 }
             }
             if let Some(start) = run {
-                self.push(start, end as u32);
+                self.ranges.push((start, end as u32));
             }
         }
         self.spare = before;
@@ -52,28 +52,23 @@ impl DrawList {
     }
 
     /// Appends the runs of set bits; `run` is the start of one that reaches the end
-    /// of the word before, and then of this one.
+    /// of the word before, and then of this one. Runs of one listed range do not
+    /// touch, nor do listed ranges, so nothing has to be merged.
     #[inline]
     fn push_runs(&mut self, base: usize, word: u64, run: &mut Option<u32>) {
-        if word == !0 {
-            run.get_or_insert(base as u32);
-            return;
+        let before = word << 1 | u64::from(run.is_some());
+        let (mut starts, mut ends) = (word & !before, !word & before);
+        while ends != 0 {
+            let start = run.take().unwrap_or_else(|| {
+                let start = base as u32 + starts.trailing_zeros();
+                starts &= starts - 1;
+                start
+            });
+            self.ranges.push((start, base as u32 + ends.trailing_zeros()));
+            ends &= ends - 1;
         }
-        let mut rest = word;
-        if let Some(start) = run.take() {
-            let more = word.trailing_ones();
-            self.push(start, base as u32 + more);
-            rest &= !0 << more;
-        }
-        while rest != 0 {
-            let from = rest.trailing_zeros();
-            let length = (rest >> from).trailing_ones();
-            if from + length == WORD as u32 {
-                *run = Some(base as u32 + from);
-                return;
-            }
-            self.push(base as u32 + from, base as u32 + from + length);
-            rest &= !0 << (from + length);
+        if starts != 0 {
+            *run = Some(base as u32 + starts.trailing_zeros());
         }
     }
 }

@@ -48,7 +48,7 @@ fn every_kernel_gives_the_bits_of_its_scalar_twin() {
             Eye32 { eye: vector().map(|x| x as f32), rest: vector().map(|x| x as f32 * 1e-7), scale: scale as f32 };
         let keep = [if round % 5 == 0 { !0 } else { rng.bits() }, rng.bits() & rng.bits() & 0xffff_0000];
         let sectors: Vec<u8> =
-            (0..128).map(|_| if rng.bits() % 4 == 0 { 0x80 } else { rng.bits() as u8 & 15 }).collect();
+            (0..128).map(|_| if rng.bits().is_multiple_of(4) { 0x80 } else { rng.bits() as u8 & 15 }).collect();
         let table = std::array::from_fn(|_| (rng.bits() as u8) & 0x80);
         let run = |k: &cullmark::culling::facing_kernels::Kernels| {
             let mut out = [keep; 6];
