@@ -28,7 +28,7 @@ pub const ENTRY: Entry<dyn Generator> = Entry {
         },
         Param {
             name: "kind",
-            default: Default::Choice(&["mixed", "zero_area", "nan", "infinite", "huge", "subnormal"]),
+            default: Default::Choice(&["mixed", "zero_area", "not_a_number", "infinite", "huge", "subnormal"]),
             about: "what is bad; huge is 1e30 m, and faces with subnormal heights are kept",
         },
         RADIUS,
@@ -49,7 +49,7 @@ enum Kind {
 
 const KINDS: [(&str, Kind); 5] = [
     ("zero_area", Kind::ZeroArea),
-    ("nan", Kind::Nan),
+    ("not_a_number", Kind::Nan),
     ("infinite", Kind::Infinite),
     ("huge", Kind::Huge),
     ("subnormal", Kind::Subnormal),
