@@ -1,5 +1,7 @@
 //! Tests: generated scenes and walks.
 
+mod stress;
+
 use cullmark::math::{DVec3, Pose};
 use cullmark::registry::Spec;
 use cullmark::scene::walkthrough::generate::{crosses, first_crossing};

@@ -1,8 +1,8 @@
 //! Seeded scene generators: the same bytes on every platform.
 //!
 //! Only integer and IEEE-exact f64 operations and `libm` take part, random
-//! numbers are ChaCha8 with a mapping of our own, and every vertex is a multiple
-//! of 2^-12 m. A change of what a generator makes must raise its `revision`
+//! numbers are ChaCha8 with a mapping of our own, and every vertex of a building is a
+//! multiple of 2^-12 m. A change of what a generator makes must raise its `revision`
 //! (a test pins the content hashes), because scenes are cached by it.
 
 mod arena;
@@ -13,6 +13,7 @@ mod props;
 pub(in crate::scene) mod random;
 mod rooms;
 mod solids;
+mod stress;
 mod terrain;
 
 use crate::error::{Error, Result};
@@ -25,7 +26,18 @@ pub trait Generator: Send + Sync {
 }
 
 /// Sorted by name.
-pub static ALL: &[Entry<dyn Generator>] = &[arena::ENTRY, blocks::ENTRY, rooms::ENTRY];
+pub static ALL: &[Entry<dyn Generator>] = &[
+    arena::ENTRY,
+    blocks::ENTRY,
+    stress::BOXES,
+    stress::COPLANAR,
+    stress::DEGENERATE,
+    stress::GRAZING,
+    rooms::ENTRY,
+    stress::SLIVERS,
+    stress::SPHERES,
+    stress::WALLS,
+];
 
 /// The generator that `spec` names, with the spec's defaults filled in.
 ///

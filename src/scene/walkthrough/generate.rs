@@ -1,6 +1,7 @@
-//! Generated walkthroughs: free-space walks, orbits and a standing camera.
+//! Generated walkthroughs: free-space walks, orbits, random poses and a standing camera.
 //! Deterministic on every platform, like the scene generators.
 
+mod random;
 mod route;
 mod space;
 
@@ -52,6 +53,7 @@ pub static ALL: &[Entry<dyn Walker>] = &[
             })
         },
     },
+    random::ENTRY,
     Entry {
         name: "static",
         about: "a camera that stands still",
