@@ -1,6 +1,10 @@
 //! The plain types in which the two halves meet: what to run, and what came of it.
 //! Serde only; ids are stable content hashes (see `ARCHITECTURE.md`).
 
+mod errors;
+
+pub use errors::{FrameErrors, observed_class};
+
 use crate::culling::{Class, Removes};
 use crate::error::{Error, Result};
 use crate::hierarchy::BuildStats;
@@ -314,55 +318,4 @@ pub struct Judgement {
     pub frames: Vec<FrameErrors>,
     /// Must equal the trials' hash.
     pub frames_hash: String,
-}
-
-/// Errors of one judged frame. Triangle counts without duplicates.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct FrameErrors {
-    pub frame: u32,
-    /// |S|, distinct triangles.
-    pub submitted: u64,
-    /// Entries submitted, replicated or split ones counted each.
-    pub submitted_entries: u64,
-    /// |V_lo|: seen by a sample or a witness ray.
-    pub visible: u64,
-    /// |V_hi|: in the exact set of frustum and facing and not proved hidden.
-    #[serde(default)]
-    pub visible_hi: u64,
-    /// |S minus V_lo|: over-submission if V* is V_lo.
-    #[serde(default)]
-    pub submitted_unseen: u64,
-    /// |S minus V_hi|: over-submission that is proved.
-    #[serde(default)]
-    pub submitted_invisible: u64,
-    /// Members of `false_culls` that only a witness ray sees.
-    #[serde(default)]
-    pub false_culls_by_ray: u64,
-    /// Samples that see a triangle which was not submitted, and all samples.
-    #[serde(default)]
-    pub false_cull_samples: u64,
-    #[serde(default)]
-    pub samples: u64,
-    /// Exact set the method is entitled to reduce to (frustum, facing).
-    pub potential: u64,
-    /// |V_lo minus S|: proved false culls that a sample sees.
-    pub false_culls: u64,
-    /// Members of the exact set lost, seen or hidden (object space).
-    pub potential_lost: u64,
-    /// Pixels whose triangle was not submitted.
-    pub false_cull_pixels: u64,
-    /// Pixels that show anything.
-    pub covered_pixels: u64,
-    pub pixels: u64,
-    /// Largest 4-connected region of such pixels.
-    pub largest_blob_px: u64,
-    /// The first few lost `source_triangle_id`s.
-    pub lost_ids: Vec<u32>,
-}
-
-impl FrameErrors {
-    /// |S| / |V_lo|; infinite when nothing is visible but something submitted.
-    pub fn over_submission(&self) -> f64 {
-        if self.submitted == 0 { 1.0 } else { self.submitted as f64 / self.visible as f64 }
-    }
 }

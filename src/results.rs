@@ -60,6 +60,9 @@ pub struct RunResult {
     pub reason: Option<String>,
     pub stop_reason: Option<String>,
     pub class: Option<Class>,
+    /// The strongest class that the judged frames do not refute.
+    #[serde(default)]
+    pub observed: Option<Class>,
     pub machine_class: String,
     /// Accepted trials, in order. Empty when times are withheld.
     pub trials: Vec<TrialSummary>,

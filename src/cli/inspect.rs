@@ -2,16 +2,19 @@
 //! submitted as a list of ids and as a picture.
 
 mod picture;
+mod text;
+
+use text::Report;
 
 use super::scene::{SceneOptions, path_file_spec, spec_of};
-use crate::culling::{self, Class, DrawList, Removes, Tally};
+use crate::culling::{self, DrawList, Tally};
 use crate::error::{Error, Result};
 use crate::manifest::axes;
-use crate::math::{Camera, Pose, Projection, View};
+use crate::math::{Camera, Projection};
 use crate::oracle::image::Grid;
-use crate::oracle::{FrameTruth, Losses, losses, verdict};
-use crate::record::{PathSource, PathSpec, SceneSpec};
-use crate::registry::{Spec, format_sum, parse_sum};
+use crate::oracle::{Effort, FrameTruth, losses, observed_class, verdict};
+use crate::record::{Accuracy, PathSource, PathSpec, SceneSpec};
+use crate::registry::{Spec, parse_sum};
 use crate::runner::{Setup, submitted};
 use crate::scene::{load, walkthrough};
 use crate::structure;
@@ -64,6 +67,12 @@ pub struct Args {
     /// s x s samples a pixel
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
     samples: u32,
+    /// Rays aimed at every triangle that no sample sees, to prove more of them visible
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    witness_rays: u32,
+    /// Prove triangles hidden in at least this many cells to a side of the image; 0 proves none
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=16_384))]
+    hiding_cells: u32,
     /// Write the submitted source triangle ids: one a line, ascending, each once, from 0
     #[arg(long, value_name = "FILE")]
     dump_submitted: Option<PathBuf>,
@@ -104,7 +113,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let view = setup.views[args.frame as usize].clone();
     let height_px = args.height.unwrap_or_else(|| (f64::from(args.width) / args.aspect).round().max(1.0) as u32);
     let grid = Grid { width_px: args.width, height_px, samples: args.samples };
-    let truth = FrameTruth::of(&setup.scene, &view, args.frame, grid);
+    let (witness_rays, hiding_cells) = (args.witness_rays, args.hiding_cells);
+    let effort = Effort::new(&setup.scene, &Accuracy { witness_rays, hiding_cells, ..Accuracy::default() });
+    let truth = FrameTruth::with(&setup.scene, &view, args.frame, grid, &effort);
     let sent = submitted(&setup.scene, &setup.hierarchy, &list);
     let mut losses = losses(&setup.scene, &view, &truth, &sent, setup.removes);
     losses.errors.submitted_entries = list.entry_count();
@@ -128,6 +139,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         truth: &truth,
         losses: &losses,
         wrong: wrong.as_deref(),
+        observed: observed_class(setup.removes, std::slice::from_ref(&losses.errors)),
+        effort: &effort,
     };
     let text = if args.json { format!("{:#}\n", report.json()) } else { report.text() };
     // A closed pipe (`| head`) is no error of ours.
@@ -210,171 +223,6 @@ fn write_ids(file: &Path, ids: &[u32]) -> Result<()> {
     std::fs::write(file, text).map_err(|e| Error::io(file, "cannot write the submitted ids", &e))
 }
 
-/// All that is printed.
-struct Report<'a> {
-    scene: &'a SceneSpec,
-    frame_count: usize,
-    method: &'a Method,
-    setup: &'a Setup,
-    view: &'a View,
-    list: &'a DrawList,
-    tally: Tally,
-    truth: &'a FrameTruth,
-    losses: &'a Losses,
-    wrong: Option<&'a str>,
-}
-
-impl Report<'_> {
-    fn draw_calls(&self) -> (u64, u64) {
-        (self.list.draw_calls(&self.setup.hierarchy), self.list.ranges.len() as u64)
-    }
-
-    fn pose(&self) -> Pose {
-        Pose { eye: self.view.eye, forward: self.view.forward, up: self.view.up }
-    }
-
-    fn text(&self) -> String {
-        let (e, n) = (&self.losses.errors, self.setup.scene.len() as u64);
-        let (calls, calls_any) = self.draw_calls();
-        let dropped = self.setup.scene.report.dropped();
-        let pose = self.pose();
-        let at = |v: crate::math::DVec3| format!("({:.3}, {:.3}, {:.3})", v.x, v.y, v.z);
-        let mut lines = vec![
-            format!("scene      {}: {} triangles, {} left out", self.scene.name, group(n), group(dropped)),
-            format!(
-                "frame      {} of {}: eye {}, forward {}",
-                e.frame,
-                self.frame_count,
-                at(pose.eye),
-                at(pose.forward)
-            ),
-            format!("structure  {}", self.method.structure),
-            format!(
-                "culling    {}, walk {}: {}",
-                format_sum(&self.method.culling),
-                self.method.walk,
-                class_name(self.setup.class)
-            ),
-            String::new(),
-            format!(
-                "submitted  {} triangles ({:.2} % of the scene), {} entries, {} draw calls ({} ignoring materials)",
-                group(e.submitted),
-                100.0 * e.submitted as f64 / n as f64,
-                group(e.submitted_entries),
-                group(calls),
-                group(calls_any)
-            ),
-        ];
-        let work = self.tally.named().map(|(name, _, value)| format!("{} {}", group(value), name.replace('_', " ")));
-        lines.push(format!("work       {}", work.join(", ")));
-        lines.push(format!("owed       {} triangles {}", group(e.potential), owed(self.setup.removes)));
-        let grid = self.truth.grid;
-        lines.push(format!(
-            "visible    {} triangles, seen by {}x{} samples in each of {} x {} pixels ({} show anything)",
-            group(e.visible),
-            grid.samples,
-            grid.samples,
-            grid.width_px,
-            grid.height_px,
-            group(e.covered_pixels)
-        ));
-        if e.visible > 0 {
-            lines.push(format!("over       {:.2} submitted a visible triangle", e.over_submission()));
-        }
-        lines.push(match e.false_culls {
-            0 => "lost       nothing that a sample sees".to_string(),
-            lost => format!(
-                "lost       {} visible triangles in {} pixels, the largest hole {} pixels",
-                group(lost),
-                group(e.false_cull_pixels),
-                group(e.largest_blob_px)
-            ),
-        });
-        if !self.losses.hidden.is_empty() {
-            lines.push(format!(
-                "           {} owed triangles that no sample sees",
-                group(self.losses.hidden.len() as u64)
-            ));
-        }
-        if !e.lost_ids.is_empty() {
-            let ids = e.lost_ids.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
-            lines.push(format!("           source ids {ids}{}", if self.more_ids() { ", ..." } else { "" }));
-        }
-        lines.push(match (self.wrong, self.setup.class) {
-            (Some(why), class) => format!("verdict    WRONG for a {} method: {why}", class_name(class)),
-            (None, Class::Aggressive | Class::Approximate) => {
-                format!("verdict    {}: errors are data", class_name(self.setup.class))
-            }
-            (None, class) => format!("verdict    right for a {} method", class_name(class)),
-        });
-        lines.extend(self.setup.scene.report.warnings.iter().map(|w| format!("warning    {w}")));
-        lines.join("\n") + "\n"
-    }
-
-    fn more_ids(&self) -> bool {
-        self.losses.seen.len() + self.losses.hidden.len() > self.losses.errors.lost_ids.len()
-    }
-
-    fn json(&self) -> serde_json::Value {
-        let source = |ids: &[u32]| ids.iter().map(|t| self.setup.scene.source_triangle_id[*t as usize]).collect();
-        let (seen, hidden): (Vec<u32>, Vec<u32>) = (source(&self.losses.seen), source(&self.losses.hidden));
-        let (calls, calls_any) = self.draw_calls();
-        let counters: serde_json::Map<_, _> =
-            self.tally.named().iter().map(|(name, _, value)| (name.to_string(), (*value).into())).collect();
-        serde_json::json!({
-            "scene": self.scene,
-            "scene_triangles": self.setup.scene.len(),
-            "load": self.setup.scene.report,
-            "frame": self.losses.errors.frame,
-            "frame_count": self.frame_count,
-            "pose": self.pose(),
-            "camera": self.view.camera,
-            "structure": self.method.structure.to_string(),
-            "culling": format_sum(&self.method.culling),
-            "walk": self.method.walk.to_string(),
-            "class": self.setup.class,
-            "removes": self.setup.removes,
-            "build": self.setup.hierarchy.stats,
-            "draw_calls": calls,
-            "draw_calls_any_material": calls_any,
-            "counters": counters,
-            "samples": self.truth.grid.samples,
-            "uncertain_triangles": self.truth.uncertain,
-            "errors": self.losses.errors,
-            "lost_visible_ids": seen,
-            "lost_hidden_ids": hidden,
-            "wrong": self.wrong,
-        })
-    }
-}
-
-fn class_name(class: Class) -> String {
-    serde_json::to_value(class).ok().and_then(|v| v.as_str().map(|s| s.replace('_', " "))).unwrap_or_default()
-}
-
-/// What bounds the set that the method must keep.
-fn owed(removes: Removes) -> &'static str {
-    match (removes.occluded, removes.back_facing, removes.outside_frustum) {
-        (true, ..) => "meet the view volume and face the eye (hidden ones may go)",
-        (_, true, _) => "meet the view volume and face the eye",
-        (_, _, true) => "meet the view volume",
-        _ => "(the whole scene: nothing may be removed)",
-    }
-}
-
-/// 1234567 as 1,234,567.
-fn group(n: u64) -> String {
-    let digits = n.to_string();
-    let mut out = String::new();
-    for (i, d) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(d);
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -387,10 +235,5 @@ mod tests {
         for bad in ["", "16:", "0:9", "-1", "wide", "inf", "1:0", "1e9"] {
             assert!(parse_aspect(bad).is_err(), "{bad}");
         }
-    }
-
-    #[test]
-    fn numbers_are_grouped_by_thousands() {
-        assert_eq!([0, 999, 1000, 1234567].map(group), ["0", "999", "1,000", "1,234,567"]);
     }
 }

@@ -133,6 +133,10 @@ pub fn measure(top: &mut Fields) -> (RepeatPolicy, Timing) {
     (repeat, timing)
 }
 
+/// Rays a triangle, and cells to a side: beyond these a frame takes hours.
+const MOST_RAYS: u32 = 100_000;
+const MOST_CELLS: u32 = 16_384;
+
 pub fn accuracy(top: &mut Fields) -> Accuracy {
     let mut accuracy = Accuracy::default();
     let Some(mut f) = top.table("accuracy") else { return accuracy };
@@ -140,6 +144,8 @@ pub fn accuracy(top: &mut Fields) -> Accuracy {
     accuracy.width_px = f.u32("width_px", 1..=16_384).unwrap_or(accuracy.width_px);
     accuracy.height_px = f.u32("height_px", 1..=16_384).unwrap_or(accuracy.height_px);
     accuracy.samples = f.u32("samples", 1..=16).unwrap_or(accuracy.samples);
+    accuracy.witness_rays = f.u32("witness_rays", 0..=MOST_RAYS).unwrap_or(accuracy.witness_rays);
+    accuracy.hiding_cells = f.u32("hiding_cells", 0..=MOST_CELLS).unwrap_or(accuracy.hiding_cells);
     f.finish();
     accuracy
 }

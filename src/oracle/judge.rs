@@ -1,15 +1,15 @@
 //! Judgement: what a method submitted against the truth of the frame.
 //!
 //! Only what is proved counts as lost: a triangle (or a piece of a split one)
-//! certainly in the set that the method owes, or the first hit of a sample ray
-//! that no submitted surface at the same depth replaces.
+//! certainly in the set that the method owes, or the first hit of a sample or
+//! witness ray that no submitted surface at the same depth replaces.
 
 use super::bits::BitSet;
 use super::footprint::Lens;
-use super::image::{ANY, BACKGROUND, Grid, Run};
+use super::image::{ANY, BACKGROUND, Grid, Run, TileRect};
 use super::volume::triangle_meets;
 use super::{FrameTruth, Standing};
-use crate::culling::{Class, Removes};
+use crate::culling::Removes;
 use crate::math::{DVec3, View};
 use crate::record::FrameErrors;
 use crate::scene::Scene;
@@ -84,38 +84,48 @@ pub fn losses(scene: &Scene, view: &View, truth: &FrameTruth, submitted: &Submit
     }
 
     // Image space.
-    let mut image = LossImage::new(truth.grid);
-    let mut seen_lost = BTreeSet::new();
     let lens = Lens::new(view, truth.grid);
-    let judge = SampleJudge { scene, view, lens: &lens, submitted, lost_pieces: &lost_pieces };
+    let judge = SampleJudge { scene, view, truth, lens: &lens, submitted, lost_pieces: &lost_pieces };
+    let mut found = Findings::new(truth.grid);
     for (index, tile) in (0u32..).zip(&truth.tiles) {
-        tile.for_each(truth.grid.tile(index), |run| judge.run(run, &mut image, &mut seen_lost));
+        let rect = truth.grid.tile(index);
+        found.lost_here.clear();
+        tile.for_each(rect, |run| judge.run(run, rect, &mut found));
         for v in &tile.veils {
             let run = Run { x: v.x, y: v.y, len: v.len, winner: v.id, alternate: BACKGROUND };
-            judge.run(run, &mut image, &mut seen_lost);
+            judge.run(run, rect, &mut found);
         }
+        found.samples += found.lost_here.count();
     }
+    let by_ray = judge.witnesses(&mut found);
 
     let count = submitted.triangles.count();
-    let seen: Vec<u32> = seen_lost.iter().copied().collect();
-    let hidden: Vec<u32> = potential_lost.difference(&seen_lost).copied().collect();
+    let (lo, hi) = (truth.lo(), truth.hi());
+    let beyond = |bound: &BitSet| submitted.triangles.iter().filter(|t| !bound.contains(*t)).count() as u64;
+    let image = &found.image;
+    let seen: Vec<u32> = found.seen_lost.iter().copied().collect();
+    let hidden: Vec<u32> = potential_lost.difference(&found.seen_lost).copied().collect();
     // What is missed in the picture first, then what is missing behind it.
     let named = seen.iter().chain(&hidden).take(NAMED);
     let errors = FrameErrors {
         frame: truth.frame,
         submitted: count,
         submitted_entries: count,
-        visible: truth.visible.len() as u64,
+        visible: lo.count(),
+        visible_hi: hi.count(),
+        submitted_unseen: beyond(&lo) - found.stand_ins(&lo, &submitted.triangles),
+        submitted_invisible: beyond(&hi),
         potential,
         false_culls: seen.len() as u64,
+        false_culls_by_ray: by_ray,
         potential_lost: potential_lost.len() as u64,
         false_cull_pixels: image.lost.count(),
+        false_cull_samples: found.samples,
+        samples: u64::from(truth.grid.columns()) * u64::from(truth.grid.rows()),
         covered_pixels: truth.covered_pixels,
         pixels: u64::from(truth.grid.width_px) * u64::from(truth.grid.height_px),
         largest_blob_px: image.largest_blob(),
-        visible_hi: standings.iter().filter(|s| s.drawable()).count() as u64,
         lost_ids: named.map(|t| scene.source_triangle_id[*t as usize]).collect(),
-        ..FrameErrors::default()
     };
     Losses { errors, seen, hidden }
 }
@@ -147,29 +157,97 @@ fn owed_pieces(
 struct SampleJudge<'a> {
     scene: &'a Scene,
     view: &'a View,
+    truth: &'a FrameTruth,
     lens: &'a Lens,
     submitted: &'a Submitted,
     lost_pieces: &'a BTreeMap<u32, Vec<[DVec3; 3]>>,
 }
 
+/// What the picture of the submitted set lacks.
+struct Findings {
+    image: LossImage,
+    seen_lost: BTreeSet<u32>,
+    /// Members of V_lo that were not submitted, and the equal surface drawn in their place.
+    replaced: BTreeMap<u32, BTreeSet<u32>>,
+    /// Samples of the tile in work that see something else.
+    lost_here: BitSet,
+    samples: u64,
+}
+
+impl Findings {
+    fn new(grid: Grid) -> Findings {
+        let side = grid.tile_side() as usize;
+        Findings {
+            image: LossImage::new(grid),
+            seen_lost: BTreeSet::new(),
+            replaced: BTreeMap::new(),
+            lost_here: BitSet::new(side * side),
+            samples: 0,
+        }
+    }
+
+    /// Submitted triangles outside V_lo that are drawn for an equal one inside it:
+    /// one each, since a class of equal surfaces is one thing to see.
+    fn stand_ins(&self, lo: &BitSet, submitted: &BitSet) -> u64 {
+        let mut taken = BTreeSet::new();
+        for (member, others) in &self.replaced {
+            let free = others.iter().find(|o| submitted.contains(**o) && !lo.contains(**o) && !taken.contains(*o));
+            if let Some(other) = free.filter(|_| !self.seen_lost.contains(member)) {
+                taken.insert(*other);
+            }
+        }
+        taken.len() as u64
+    }
+}
+
 impl SampleJudge<'_> {
-    fn run(&self, run: Run, image: &mut LossImage, seen_lost: &mut BTreeSet<u32>) {
-        if run.winner == BACKGROUND || run.alternate == ANY {
+    fn run(&self, run: Run, rect: TileRect, found: &mut Findings) {
+        if run.winner == BACKGROUND {
             return;
         }
         let t = run.winner - 1;
         debug_assert!((t as usize) < self.scene.len());
-        let replaced = run.alternate != BACKGROUND && self.drawn_whole(run.alternate - 1);
-        if replaced || self.drawn_whole(t) {
+        if self.drawn_whole(t) {
+            return;
+        }
+        // Whatever may be drawn in its place.
+        let one = [run.alternate.wrapping_sub(1)];
+        let others: &[u32] = match run.alternate {
+            BACKGROUND => &[],
+            ANY => match self.truth.bracket.ties_of(t) {
+                Some(ties) => ties,
+                // Nothing is known of what ties here, so nothing is proved.
+                None => return,
+            },
+            _ => &one,
+        };
+        if let Some(other) = others.iter().find(|o| self.drawn_whole(**o)) {
+            if !self.submitted.triangles.contains(t) {
+                found.replaced.entry(t).or_default().insert(*other);
+            }
             return;
         }
         for x in run.x..run.x + run.len {
-            let hit = |id: u32| id != BACKGROUND && self.drawn_at(id - 1, x, run.y);
-            if !hit(run.winner) && !hit(run.alternate) {
-                image.lost.insert(image.grid.pixel(x, run.y) as u32);
-                seen_lost.insert(t);
+            let hit = |t: u32| self.drawn_at(t, x, run.y);
+            if !hit(t) && !others.iter().any(|o| hit(*o)) {
+                found.image.lost.insert(found.image.grid.pixel(x, run.y) as u32);
+                found.lost_here.insert((run.y - rect.y0) * rect.width() as u32 + x - rect.x0);
+                found.seen_lost.insert(t);
             }
         }
+    }
+
+    /// Adds what only rays see to the losses; returns how many those are.
+    fn witnesses(&self, found: &mut Findings) -> u64 {
+        let drawn = |t: &u32| self.submitted.triangles.contains(*t);
+        let mut lost = 0;
+        for w in self.truth.bracket.witnesses.iter().filter(|w| !drawn(&w.triangle)) {
+            match w.tied.iter().find(|t| drawn(t)) {
+                Some(other) => _ = found.replaced.entry(w.triangle).or_default().insert(*other),
+                None => lost += u64::from(found.seen_lost.insert(w.triangle)),
+            }
+        }
+        lost
     }
 
     fn drawn_whole(&self, t: u32) -> bool {
@@ -229,43 +307,6 @@ impl LossImage {
     }
 }
 
-/// Why a method is wrong for its declared class, if it is.
-///
-/// Conservative methods may lose nothing that is proved to be owed, seen or not;
-/// sample-conservative ones nothing that a sample sees; exact ones, moreover, may
-/// not submit more than the set. Errors of the others are data.
-pub fn verdict(class: Class, frames: &[FrameErrors]) -> Option<String> {
-    let wrong: Vec<String> = frames.iter().filter_map(|f| reason(class, f)).collect();
-    let more = match wrong.len() {
-        0 => return None,
-        1 => String::new(),
-        n => format!("; {} more of {} judged frames are wrong", n - 1, frames.len()),
-    };
-    Some(format!("{}{more}", wrong[0]))
-}
-
-fn reason(class: Class, f: &FrameErrors) -> Option<String> {
-    let (seen, owed) = match class {
-        Class::Exact | Class::Conservative => (f.false_culls, f.potential_lost),
-        Class::SampleConservative => (f.false_culls, 0),
-        Class::Aggressive | Class::Approximate => return None,
-    };
-    let lost = seen.max(owed);
-    if lost > 0 {
-        let ids = f.lost_ids.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
-        let triangles = if lost == 1 { "1 triangle, id".into() } else { format!("{lost} triangles, first ids") };
-        let place = match (seen, f.false_cull_pixels) {
-            (0, _) => "in the view volume, though hidden from every sample".to_string(),
-            (_, 1) => "seen in 1 pixel".to_string(),
-            (_, n) => format!("seen in {n} pixels"),
-        };
-        return Some(format!("frame {}: lost {triangles} {ids} ({place})", f.frame));
-    }
-    (class == Class::Exact && f.submitted > f.potential).then(|| {
-        format!("frame {}: submitted {} triangles, but the exact set holds {}", f.frame, f.submitted, f.potential)
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -278,31 +319,5 @@ mod tests {
             image.lost.insert(pixel);
         }
         assert_eq!(image.largest_blob(), 3, "0, 1 and 5; likewise 7, 12 and 13");
-    }
-
-    #[test]
-    fn a_verdict_names_frame_ids_and_pixels() {
-        let lost = FrameErrors {
-            frame: 12,
-            false_culls: 3,
-            potential_lost: 3,
-            false_cull_pixels: 240,
-            lost_ids: vec![17, 20, 33],
-            ..Default::default()
-        };
-        let fine = FrameErrors { frame: 3, submitted: 5, potential: 4, ..Default::default() };
-        let frames = [fine.clone(), lost.clone()];
-        assert_eq!(
-            verdict(Class::Conservative, &frames).unwrap(),
-            "frame 12: lost 3 triangles, first ids 17, 20, 33 (seen in 240 pixels)"
-        );
-        assert_eq!(verdict(Class::Aggressive, &frames), None);
-        let hidden = FrameErrors { false_culls: 0, false_cull_pixels: 0, ..lost };
-        assert!(
-            verdict(Class::Conservative, std::slice::from_ref(&hidden)).unwrap().contains("hidden from every sample")
-        );
-        assert_eq!(verdict(Class::SampleConservative, &[hidden]), None);
-        assert!(verdict(Class::Exact, std::slice::from_ref(&fine)).unwrap().contains("the exact set holds 4"));
-        assert_eq!(verdict(Class::Conservative, &[fine]), None);
     }
 }

@@ -1,9 +1,14 @@
 //! The oracle: ground truth of a frame, and the judgement of what was submitted.
 //!
-//! Two lower bounds on what a method must submit, both proved:
+//! Lower bounds on what a method must submit, all proved:
 //! - the exact sets ([`sets`]): triangles that certainly meet the view volume and
 //!   face the eye, seen or hidden;
-//! - the item buffer ([`item_buffer`]): triangles that a sample ray hits first.
+//! - the item buffer ([`item_buffer`]): triangles that a sample ray hits first;
+//! - witness rays ([`rays`]) at what no sample sees. With the samples they make
+//!   V_lo, a subset of the visible set V*.
+//!
+//! An upper bound: V_hi ([`hiding`]), the exact set without what is proved hidden.
+//! For small scenes V* itself is found by clipping ([`clipping`]).
 //!
 //! The oracle imports no hierarchy, no raster kernel and no algorithm that it
 //! judges: of `culling` only the plain types that name a promise. Truth is a
@@ -11,17 +16,26 @@
 //! shared by every method; it is the same at any number of threads.
 
 pub mod bits;
+pub mod bracket;
 pub mod cache;
 pub mod footprint;
+pub mod hiding;
 pub mod image;
 pub mod item_buffer;
 pub mod judge;
+pub mod outline;
+pub mod patch;
+pub mod rays;
 pub mod sets;
+pub mod verdict;
 pub mod volume;
 
+pub use crate::record::observed_class;
 pub use bits::BitSet;
+pub use bracket::{Bracket, Effort};
 pub use cache::truth_cached;
-pub use judge::{Losses, Submitted, judge_frame, losses, verdict};
+pub use judge::{Losses, Submitted, judge_frame, losses};
+pub use verdict::verdict;
 
 use crate::math::{Camera, Pose, View};
 use crate::record::Accuracy;
@@ -32,7 +46,7 @@ use serde::{Deserialize, Serialize};
 use sets::Standing;
 
 /// Raised when truth changes: part of every cached file.
-pub const REVISION: u32 = 1;
+pub const REVISION: u32 = 2;
 
 /// Truth of the judged frames of one scene, camera and path.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,8 +68,10 @@ pub struct FrameTruth {
     pub grid: Grid,
     /// Exact standing of every triangle; see [`FrameTruth::standings`].
     standings: Vec<u8>,
-    /// V_lo: triangles that at least one sample sees, ascending, with their sample counts.
+    /// Triangles that at least one sample sees, ascending, with their sample counts.
     pub visible: Vec<(u32, u32)>,
+    /// What V_lo and V_hi know beyond the samples.
+    pub bracket: Bracket,
     /// Item image by tile of [`Grid`].
     pub tiles: Vec<TileRuns>,
     /// Pixels of which a sample sees anything.
@@ -78,15 +94,24 @@ impl FrameTruth {
         all
     }
 
-    /// Computes the truth of `view`.
+    /// Computes the truth of `view` from samples alone.
     pub fn of(scene: &Scene, view: &View, frame: u32, grid: Grid) -> FrameTruth {
+        Self::with(scene, view, frame, grid, &Effort::NONE)
+    }
+
+    /// The same with witness rays and proofs of hiding.
+    pub fn with(scene: &Scene, view: &View, frame: u32, grid: Grid, effort: &Effort) -> FrameTruth {
         let (standings, predicates) = sets::standings(scene, view);
         let tiles = item_buffer::draw(scene, view, &standings, grid);
         let (counts, covered_pixels) = count_samples(scene.len(), grid, &tiles);
+        let visible: Vec<(u32, u32)> = (0u32..).zip(counts).filter(|(_, n)| *n > 0).collect();
+        let mut seen = BitSet::new(scene.len());
+        visible.iter().for_each(|(t, _)| seen.insert(*t));
         FrameTruth {
             frame,
             grid,
-            visible: (0u32..).zip(counts).filter(|(_, n)| *n > 0).collect(),
+            bracket: Bracket::of(scene, view, &standings, (grid, &tiles), &seen, effort),
+            visible,
             tiles,
             covered_pixels,
             predicate_calls: predicates.calls,
@@ -94,6 +119,25 @@ impl FrameTruth {
             uncertain: standings.iter().filter(|s| s.meets == volume::Meets::Uncertain).count() as u64,
             standings: image::encode_bytes(standings.iter().map(|s| s.to_byte())),
         }
+    }
+
+    /// V_lo: what a sample or a witness ray sees.
+    pub fn lo(&self) -> BitSet {
+        let len: usize = image::decode_bytes(&self.standings).map(|(_, n)| n).sum();
+        let mut set = BitSet::new(len);
+        self.visible.iter().for_each(|(t, _)| set.insert(*t));
+        self.bracket.witnesses.iter().for_each(|w| set.insert(w.triangle));
+        set
+    }
+
+    /// V_hi: may be part of an image and is not proved hidden.
+    pub fn hi(&self) -> BitSet {
+        let standings = self.standings();
+        let hidden = self.bracket.hidden(standings.len());
+        let mut set = BitSet::new(standings.len());
+        let kept = (0u32..).zip(&standings).filter(|(t, s)| s.drawable() && !hidden.contains(*t));
+        kept.for_each(|(t, _)| set.insert(t));
+        set
     }
 
     /// Triangle + 1 by sample, row-major from the top left; for tests and pictures.
@@ -110,7 +154,8 @@ impl FrameTruth {
 
     /// Bytes in memory.
     pub fn bytes(&self) -> usize {
-        self.standings.len() + size_of_val(&self.visible[..]) + self.tiles.iter().map(TileRuns::bytes).sum::<usize>()
+        let tiles = self.tiles.iter().map(TileRuns::bytes).sum::<usize>();
+        self.standings.len() + size_of_val(&self.visible[..]) + self.bracket.bytes() + tiles
     }
 }
 
@@ -140,7 +185,9 @@ fn count_samples(triangles: usize, grid: Grid, tiles: &[TileRuns]) -> (Vec<u32>,
 /// Truth of `poses` (frame number and pose). Frames run in parallel.
 pub fn truth(scene: &Scene, camera: &Camera, poses: &[(u32, Pose)], accuracy: &Accuracy) -> Truth {
     let grid = Grid { width_px: accuracy.width_px, height_px: accuracy.height_px, samples: accuracy.samples };
-    let frames = poses.par_iter().map(|(frame, pose)| FrameTruth::of(scene, &View::new(camera, pose), *frame, grid));
+    let effort = Effort::new(scene, accuracy);
+    let frames =
+        poses.par_iter().map(|(frame, pose)| FrameTruth::with(scene, &View::new(camera, pose), *frame, grid, &effort));
     Truth { scene_triangles: scene.len() as u32, frames: frames.collect() }
 }
 

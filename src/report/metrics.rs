@@ -51,11 +51,37 @@ pub static METRICS: &[Metric] = &[
     }),
     metric("cull_ms", "ms", Measured, "culling time a frame, mean over the path", |r| per_frame(r, stats::mean, 1e6)),
     metric("depth", "levels", Counted, "depth of the tree", |r| counter(r, "depth")),
+    metric(
+        "duplicates",
+        "entries",
+        Judged,
+        "entries beyond the first of each triangle, summed over judged frames",
+        |r| judged(r, |e| e.duplicates() as f64),
+    ),
+    metric("fallbacks_exact_share", "", Counted, "signs that needed exact arithmetic, of all asked", |r| {
+        of_predicates(r, "fallbacks_exact")
+    }),
+    metric("fallbacks_f64_share", "", Counted, "signs that single precision could not tell, of all asked", |r| {
+        of_predicates(r, "fallbacks_f64")
+    }),
     metric("false_cull_ppm", "px/M", Judged, "pixels whose triangle was not submitted, per million pixels", |r| {
         share(r, |e| e.false_cull_pixels as f64, |e| e.pixels as f64, 1e6)
     }),
+    metric(
+        "false_cull_sample_ppm",
+        "smp/M",
+        Judged,
+        "samples whose triangle was not submitted, per million samples",
+        |r| share(r, |e| e.false_cull_samples as f64, |e| e.samples as f64, 1e6),
+    ),
+    metric("false_cull_share", "", Judged, "visible triangles not submitted, of all visible ones", |r| {
+        share(r, |e| e.false_culls as f64, |e| e.visible as f64, 1.0)
+    }),
     metric("false_culls", "triangles", Judged, "visible triangles not submitted, summed over judged frames", |r| {
         judged(r, |e| e.false_culls as f64)
+    }),
+    metric("false_culls_by_ray", "triangles", Judged, "of the false culls those that no sample sees", |r| {
+        judged(r, |e| e.false_culls_by_ray as f64)
     }),
     metric("frame_ms_model", "ms", Modelled, "culling + indices + draw calls, a frame, mean over the path", |r| {
         modelled(r).iter().map(|total| total / frames(r) as f64).collect()
@@ -89,6 +115,12 @@ pub static METRICS: &[Metric] = &[
         let seen: Vec<f64> = r.errors.iter().map(|e| e.over_submission()).filter(|x| x.is_finite()).collect();
         average(&seen)
     }),
+    metric("over_submission_hi", "", Judged, "share of what was submitted that is not known to be visible", |r| {
+        bracketed(r, |e| e.submitted_unseen as f64)
+    }),
+    metric("over_submission_lo", "", Judged, "share of what was submitted that is proved invisible", |r| {
+        bracketed(r, |e| e.submitted_invisible as f64)
+    }),
     metric("p99_cull_ms", "ms", Measured, "99th percentile of culling time a frame", |r| per_frame(r, p99, 1e6)),
     metric("p99_frame_us", "µs", Measured, "99th percentile of culling time a frame", |r| per_frame(r, p99, 1e3)),
     metric("peak_rss_mib", "MiB", Measured, "peak resident memory of the trial, the scene included", |r| {
@@ -117,6 +149,12 @@ pub static METRICS: &[Metric] = &[
     metric("total_cull_ms", "ms", Measured, "culling time summed over the path", totals),
     metric("total_frame_ms_model", "ms", Modelled, "modelled frame time summed over the path", modelled),
     metric("trials", "trials", Counted, "accepted trials", |r| vec![r.trials.len() as f64]),
+    metric("visible_hi", "triangles", Judged, "|V_hi|: not proved invisible, mean over judged frames", |r| {
+        bracketed_mean(r, |e| e.visible_hi as f64)
+    }),
+    metric("visible_lo", "triangles", Judged, "|V_lo|: proved visible, mean over judged frames", |r| {
+        judged(r, |e| e.visible as f64).iter().map(|sum| sum / r.errors.len() as f64).collect()
+    }),
 ];
 
 impl Metric {
@@ -228,6 +266,24 @@ fn judged(run: &RunResult, of: OfFrame) -> Vec<f64> {
 fn share(run: &RunResult, part: OfFrame, whole: OfFrame, unit: f64) -> Vec<f64> {
     let (part, whole): (f64, f64) = (run.errors.iter().map(part).sum(), run.errors.iter().map(whole).sum());
     if whole > 0.0 { vec![part / whole * unit] } else { vec![] }
+}
+
+/// Only where the judgement knew brackets: older ones left these fields 0.
+fn bracketed(run: &RunResult, part: OfFrame) -> Vec<f64> {
+    if run.errors.iter().all(|e| e.samples == 0) { vec![] } else { share(run, part, |e| e.submitted as f64, 1.0) }
+}
+
+fn bracketed_mean(run: &RunResult, of: OfFrame) -> Vec<f64> {
+    let known = run.errors.iter().any(|e| e.samples > 0);
+    judged(run, of).iter().filter(|_| known).map(|sum| sum / run.errors.len() as f64).collect()
+}
+
+/// Of the signs that a filtered predicate was asked; nothing where none was.
+fn of_predicates(run: &RunResult, name: &str) -> Vec<f64> {
+    match (counter(run, name).first(), counter(run, "predicates").first()) {
+        (Some(part), Some(all)) if *all > 0.0 => vec![part / all],
+        _ => vec![],
+    }
 }
 
 #[cfg(test)]

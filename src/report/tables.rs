@@ -131,16 +131,28 @@ pub fn errors(grid: &Grid) -> Table {
             ("false_culls", "false culls"),
             ("false_cull_ppm", "false-cull pixels"),
             ("largest_blob_px", "largest hole"),
+            ("false_culls_by_ray", "seen by rays alone"),
             ("potential_lost", "lost from exact set"),
+            ("visible_lo", "visible, at least"),
+            ("visible_hi", "visible, at most"),
             ("over_submission", "over-submission"),
+            ("over_submission_lo", "invisible, at least"),
+            ("over_submission_hi", "invisible, at most"),
+            ("duplicates", "duplicates"),
         ],
     );
     table.columns.insert(3, Column::text("class"));
+    table.columns.insert(4, Column::text("observed"));
     for (row, run) in table.rows.iter_mut().zip(&grid.results.runs) {
         row.insert(3, class_of(run));
+        row.insert(4, run.observed.map_or(Cell::Missing, |c| Cell::Text(class_word(c).into())));
     }
     table.caption = "False culls: visible triangles that were not submitted, summed over the judged frames. \
                      False-cull pixels: per million pixels. Over-submission: submitted over visible triangles. \
+                     Class is what the method declares, observed the strongest class that the judged frames do \
+                     not refute: “approximate” lost visible triangles and kept others beyond the set it is entitled \
+                     to reduce to. Visible triangles a frame lie between what samples and witness rays see and what \
+                     is not proved hidden; so does the share of what was submitted in vain. \
                      An empty cell was not judged; a zero was."
         .into();
     table

@@ -4,7 +4,7 @@
 use super::fetch::{SeriesRow, TrialRow};
 use super::{Store, blob};
 use crate::error::{Error, Result, did_you_mean};
-use crate::record::{Judgement, RepeatPolicy, RunSpec};
+use crate::record::{Judgement, RepeatPolicy, RunSpec, observed_class};
 use crate::results::{Excluded, RunResult, RunStatus, StudyResults, TrialSummary};
 use crate::stats;
 use rayon::prelude::*;
@@ -313,6 +313,7 @@ impl Store {
             reason,
             stop_reason: row.stop_reason.clone(),
             class: judgement.map(|j| j.class),
+            observed: judgement.and_then(|j| observed_class(j.removes, &j.frames)),
             machine_class: row.machine_class.clone(),
             trials: best.iter().map(|t| summary(t)).collect(),
             cull_ns: median_by_frame(&trial_cull_ns),

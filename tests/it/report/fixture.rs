@@ -134,7 +134,7 @@ pub fn run(
     let lost = |f: u32, rng: &mut Random| {
         if approximate && f.is_multiple_of(3) { (rng.unit() * 40.0 * per_triangle * 20.0) as u64 } else { 0 }
     };
-    let errors = (0..20)
+    let errors: Vec<FrameErrors> = (0..20)
         .map(|i| {
             let frame = i * (frames as u32 / 20).max(1);
             let (submitted, false_culls) = (triangles[(frame as usize).min(frames - 1)] as u64, lost(i, &mut rng));
@@ -174,6 +174,7 @@ pub fn run(
         reason: None,
         stop_reason: Some("repeats".into()),
         class: Some(if approximate { Class::Approximate } else { Class::Conservative }),
+        observed: observed_class(cullmark::culling::Removes::default(), &errors),
         machine_class: "lab".into(),
         trials,
         cull_ns,
