@@ -4,6 +4,7 @@
 mod arithmetics;
 mod build;
 mod facing;
+mod fixed;
 mod frustum;
 mod kernels;
 mod masks;
