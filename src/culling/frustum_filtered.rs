@@ -56,7 +56,13 @@ pub fn signs(frame: &FramePlanes, bounds: &BoundsBlock, wanted: u8, want_inside:
 
 /// What this processor can run, the widest first, the scalar twin last.
 pub fn kernels() -> Vec<(&'static str, SignKernel)> {
-    vec![("scalar", signs as SignKernel)]
+    let mut found: Vec<(&'static str, SignKernel)> = Vec::new();
+    #[cfg(target_arch = "x86_64")]
+    if super::frustum_x86::has_avx2() {
+        found.push(("avx2", super::frustum_x86::signs_avx2));
+    }
+    found.push(("scalar", signs));
+    found
 }
 
 /// The arithmetic `filtered`.

@@ -117,7 +117,19 @@ type Kernel = fn(&FixedPlanes, &FixedBlock, u8, bool, &mut PlaneMasks) -> u8;
 
 /// What this processor can run, the widest first, the scalar twin last.
 pub fn kernels() -> Vec<(&'static str, Kernel)> {
-    vec![("scalar", block as Kernel)]
+    let mut found: Vec<(&'static str, Kernel)> = Vec::new();
+    #[cfg(target_arch = "x86_64")]
+    {
+        use super::frustum_fixed_x86 as x86;
+        if x86::has_avx512() {
+            found.push(("avx512", x86::block_avx512));
+        }
+        if x86::has_avx2() {
+            found.push(("avx2", x86::block_avx2));
+        }
+    }
+    found.push(("scalar", block));
+    found
 }
 
 /// The arithmetic `fixed_q16`, with its column of boxes.

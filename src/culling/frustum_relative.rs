@@ -20,19 +20,28 @@ pub struct Kernels {
 
 /// What this processor can run, the widest first, the scalar twin last.
 pub fn kernels() -> Vec<Kernels> {
+    kernels_of::<true>()
+}
+
+/// The same with or without guard: for `f32_relative` or `f32_world`.
+pub fn kernels_of<const GUARDED: bool>() -> Vec<Kernels> {
     use super::frustum_scalar as scalar;
     let mut found = Vec::new();
     #[cfg(target_arch = "x86_64")]
     {
         use super::frustum_x86 as x86;
         if x86::has_avx512() {
-            found.push(Kernels { name: "avx512", block: x86::block_avx2, flat: x86::flat_avx512 });
+            found.push(Kernels {
+                name: "avx512",
+                block: x86::block_avx2::<GUARDED>,
+                flat: x86::flat_avx512::<GUARDED>,
+            });
         }
         if x86::has_avx2() {
-            found.push(Kernels { name: "avx2", block: x86::block_avx2, flat: x86::flat_avx2 });
+            found.push(Kernels { name: "avx2", block: x86::block_avx2::<GUARDED>, flat: x86::flat_avx2::<GUARDED> });
         }
     }
-    found.push(Kernels { name: "scalar", block: scalar::block, flat: scalar::flat });
+    found.push(Kernels { name: "scalar", block: scalar::block::<GUARDED>, flat: scalar::flat::<GUARDED> });
     found
 }
 

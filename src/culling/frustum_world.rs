@@ -16,7 +16,8 @@
 //! Boxes with a NaN or infinite bound are made NaN altogether, hence kept (B5.4).
 
 use super::frustum_arithmetic::{Ask, PlaneTest};
-use super::frustum_planes::{FramePlanes, Plane32, PlaneMasks};
+use super::frustum_planes::{FramePlanes, Plane32, PlaneMasks, Work};
+use super::frustum_relative::{Kernels, kernels_of};
 use super::{Class, Tally};
 use crate::hierarchy::{BoundsBlock, Hierarchy, LANES};
 use crate::math::{Box32, DVec3, Vec3, View};
@@ -79,31 +80,17 @@ pub fn world_box(b: &Box32, origin: DVec3) -> Box32 {
     if lo.is_finite() && hi.is_finite() { Box32 { lo, hi } } else { Box32 { lo: Vec3::NAN, hi: Vec3::NAN } }
 }
 
-/// Judges 8 boxes; see `frustum_scalar::block`.
-pub fn block(frame: &FramePlanes, bounds: &BoundsBlock, wanted: u8, want_inside: bool, out: &mut PlaneMasks) {
-    for k in super::frustum_arithmetic::bits(wanted) {
-        let plane = &frame.planes[k];
-        let (mut outside, mut inside) = (0, 0);
-        for lane in 0..LANES {
-            let b = bounds.get(lane);
-            let a = [b.lo.x, b.lo.y, b.lo.z, b.hi.x, b.hi.y, b.hi.z];
-            outside |= u8::from(super::frustum_scalar::value(plane, &a, &plane.p, plane.d_out) < 0.0) << lane;
-            if want_inside {
-                inside |= u8::from(super::frustum_scalar::value(plane, &a, &plane.n, plane.d_in) > 0.0) << lane;
-            }
-        }
-        out.outside[k] = outside;
-        if want_inside {
-            out.inside[k] = inside;
-        }
-    }
-}
-
 /// The arithmetic `f32_world`, with its column of boxes.
-#[derive(Default)]
 pub struct World {
+    kernels: Kernels,
     frame: FramePlanes,
     bounds: Vec<BoundsBlock>,
+}
+
+impl Default for World {
+    fn default() -> World {
+        World { kernels: kernels_of::<false>()[0], frame: FramePlanes::default(), bounds: Vec::new() }
+    }
 }
 
 impl PlaneTest for World {
@@ -128,6 +115,10 @@ impl PlaneTest for World {
     }
 
     fn block(&mut self, _: &Hierarchy, ask: &Ask, masks: &mut PlaneMasks, _: &mut Tally) {
-        block(&self.frame, &self.bounds[ask.block as usize], ask.planes, ask.inside, masks);
+        (self.kernels.block)(&self.frame, &self.bounds[ask.block as usize], ask.planes, ask.inside, masks);
+    }
+
+    fn flat(&mut self, _: &Hierarchy, live: &[u8], outside: &mut [u8], _: &mut Tally) -> Work {
+        (self.kernels.flat)(&self.frame, &self.bounds[..outside.len()], live, outside)
     }
 }

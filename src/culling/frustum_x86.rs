@@ -2,8 +2,10 @@
 //!
 //! Explicit intrinsics throughout: rustc 1.95 was seen to miscompile plain lane
 //! loops when it vectorises them for AVX-512, so none stands in a function that
-//! enables it. The operations and their order are those of `frustum_scalar`.
+//! enables it. The operations and their order are those of `frustum_scalar`: with
+//! `GUARDED` those of `f32_relative`, without it those of `f32_world`.
 
+use super::frustum_filtered::Signs;
 use super::frustum_planes::{FramePlanes, GUARD, PlaneMasks, Work};
 use crate::hierarchy::BoundsBlock;
 use std::arch::x86_64::*;
@@ -20,23 +22,34 @@ pub fn has_avx512() -> bool {
 ///
 /// # Panics
 /// If the processor lacks AVX2.
-pub fn block_avx2(frame: &FramePlanes, bounds: &BoundsBlock, wanted: u8, want_inside: bool, out: &mut PlaneMasks) {
+pub fn block_avx2<const GUARDED: bool>(
+    frame: &FramePlanes,
+    bounds: &BoundsBlock,
+    wanted: u8,
+    want_inside: bool,
+    out: &mut PlaneMasks,
+) {
     assert!(has_avx2());
     // SAFETY: the processor has the features, as just asserted.
-    unsafe { block_256(frame, bounds, wanted, want_inside, out) }
+    unsafe { block_256::<GUARDED>(frame, bounds, wanted, want_inside, out) }
 }
 
 /// See `frustum_scalar::flat`.
 ///
 /// # Panics
 /// If the processor lacks AVX2.
-pub fn flat_avx2(frame: &FramePlanes, bounds: &[BoundsBlock], live: &[u8], outside: &mut [u8]) -> Work {
+pub fn flat_avx2<const GUARDED: bool>(
+    frame: &FramePlanes,
+    bounds: &[BoundsBlock],
+    live: &[u8],
+    outside: &mut [u8],
+) -> Work {
     assert!(has_avx2());
     // SAFETY: the processor has the features, as just asserted.
     unsafe {
         match frame.count {
-            5 => flat_256::<5>(frame, bounds, live, outside),
-            6 => flat_256::<6>(frame, bounds, live, outside),
+            5 => flat_256::<5, GUARDED>(frame, bounds, live, outside),
+            6 => flat_256::<6, GUARDED>(frame, bounds, live, outside),
             count => unreachable!("a view has 5 or 6 planes, not {count}"),
         }
     }
@@ -46,31 +59,50 @@ pub fn flat_avx2(frame: &FramePlanes, bounds: &[BoundsBlock], live: &[u8], outsi
 ///
 /// # Panics
 /// If the processor lacks AVX-512 F and DQ.
-pub fn flat_avx512(frame: &FramePlanes, bounds: &[BoundsBlock], live: &[u8], outside: &mut [u8]) -> Work {
+pub fn flat_avx512<const GUARDED: bool>(
+    frame: &FramePlanes,
+    bounds: &[BoundsBlock],
+    live: &[u8],
+    outside: &mut [u8],
+) -> Work {
     assert!(has_avx512());
     // SAFETY: the processor has the features, as just asserted.
     unsafe {
         match frame.count {
-            5 if bounds.len() > NEAR => flat_512::<5, true>(frame, bounds, live, outside),
-            5 => flat_512::<5, false>(frame, bounds, live, outside),
-            6 if bounds.len() > NEAR => flat_512::<6, true>(frame, bounds, live, outside),
-            6 => flat_512::<6, false>(frame, bounds, live, outside),
+            5 if bounds.len() > NEAR => flat_512::<5, true, GUARDED>(frame, bounds, live, outside),
+            5 => flat_512::<5, false, GUARDED>(frame, bounds, live, outside),
+            6 if bounds.len() > NEAR => flat_512::<6, true, GUARDED>(frame, bounds, live, outside),
+            6 => flat_512::<6, false, GUARDED>(frame, bounds, live, outside),
             count => unreachable!("a view has 5 or 6 planes, not {count}"),
         }
     }
+}
+
+/// See `frustum_filtered::signs`.
+///
+/// # Panics
+/// If the processor lacks AVX2.
+pub fn signs_avx2(frame: &FramePlanes, bounds: &BoundsBlock, wanted: u8, want_inside: bool, out: &mut Signs) {
+    assert!(has_avx2());
+    // SAFETY: the processor has the features, as just asserted.
+    unsafe { signs_256(frame, bounds, wanted, want_inside, out) }
 }
 
 /// 8 boxes relative to the eye, and the guard of each. Two of the eight registers are
 /// there only so that an index of three bits needs no check.
 #[target_feature(enable = "avx2")]
 #[inline]
-fn relative_256(eye: &[__m256; 3], bounds: &BoundsBlock) -> ([__m256; 8], __m256) {
+fn relative_256<const GUARDED: bool>(eye: &[__m256; 3], bounds: &BoundsBlock) -> ([__m256; 8], __m256) {
     let positive = _mm256_castsi256_ps(_mm256_set1_epi32(0x7fff_ffff));
     let mut a = [_mm256_setzero_ps(); 8];
     let mut magnitude = [_mm256_setzero_ps(); 3];
     for axis in 0..3 {
         // SAFETY: a row of 8 f32 is 32 bytes, and rows are 32-byte aligned in the 64-byte aligned block.
         let (lo, hi) = unsafe { (_mm256_load_ps(bounds.lo[axis].as_ptr()), _mm256_load_ps(bounds.hi[axis].as_ptr())) };
+        if !GUARDED {
+            (a[axis], a[axis + 3]) = (lo, hi);
+            continue;
+        }
         let (lo, hi) = (_mm256_sub_ps(lo, eye[axis]), _mm256_sub_ps(hi, eye[axis]));
         magnitude[axis] = _mm256_add_ps(_mm256_and_ps(lo, positive), _mm256_and_ps(hi, positive));
         (a[axis], a[axis + 3]) = (lo, hi);
@@ -96,9 +128,15 @@ fn negated_256(x: __m256) -> __m256 {
 }
 
 #[target_feature(enable = "avx2,fma,popcnt")]
-fn block_256(frame: &FramePlanes, bounds: &BoundsBlock, wanted: u8, want_inside: bool, out: &mut PlaneMasks) {
+fn block_256<const GUARDED: bool>(
+    frame: &FramePlanes,
+    bounds: &BoundsBlock,
+    wanted: u8,
+    want_inside: bool,
+    out: &mut PlaneMasks,
+) {
     let eye = frame.eye.map(|e| _mm256_set1_ps(e));
-    let (a, guard) = relative_256(&eye, bounds);
+    let (a, guard) = relative_256::<GUARDED>(&eye, bounds);
     let below = negated_256(guard);
     let mut wanted = wanted & frame.all();
     while wanted != 0 {
@@ -115,11 +153,41 @@ fn block_256(frame: &FramePlanes, bounds: &BoundsBlock, wanted: u8, want_inside:
 }
 
 #[target_feature(enable = "avx2,fma,popcnt")]
-fn flat_256<const N: usize>(frame: &FramePlanes, bounds: &[BoundsBlock], live: &[u8], outside: &mut [u8]) -> Work {
+fn signs_256(frame: &FramePlanes, bounds: &BoundsBlock, wanted: u8, want_inside: bool, out: &mut Signs) {
+    let eye = frame.eye.map(|e| _mm256_set1_ps(e));
+    let (a, guard) = relative_256::<true>(&eye, bounds);
+    let minus = negated_256(guard);
+    let mut wanted = wanted & frame.all();
+    while wanted != 0 {
+        let k = wanted.trailing_zeros() as usize;
+        wanted &= wanted - 1;
+        let plane = &frame.planes[k];
+        let below = |corner| {
+            let s = value_256(&plane.normal, &a, corner, plane.d_out);
+            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(s, minus)) as u8
+        };
+        let above = |corner| {
+            let s = value_256(&plane.normal, &a, corner, plane.d_in);
+            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(s, guard)) as u8
+        };
+        (out.p_below[k], out.p_above[k]) = (below(&plane.p), above(&plane.p));
+        if want_inside {
+            (out.n_below[k], out.n_above[k]) = (below(&plane.n), above(&plane.n));
+        }
+    }
+}
+
+#[target_feature(enable = "avx2,fma,popcnt")]
+fn flat_256<const N: usize, const GUARDED: bool>(
+    frame: &FramePlanes,
+    bounds: &[BoundsBlock],
+    live: &[u8],
+    outside: &mut [u8],
+) -> Work {
     let eye = frame.eye.map(|e| _mm256_set1_ps(e));
     let mut work = Work::default();
     for ((bounds, live), out) in bounds.iter().zip(live).zip(outside) {
-        let (a, guard) = relative_256(&eye, bounds);
+        let (a, guard) = relative_256::<GUARDED>(&eye, bounds);
         let below = negated_256(guard);
         let mut left = u32::from(live & !*out);
         work.lanes += u64::from(left.count_ones());
@@ -155,7 +223,7 @@ const AHEAD: usize = 32;
 const NEAR: usize = 4096;
 
 #[target_feature(enable = "avx512f,avx512dq,popcnt")]
-fn flat_512<const N: usize, const FAR: bool>(
+fn flat_512<const N: usize, const FAR: bool, const GUARDED: bool>(
     frame: &FramePlanes,
     bounds: &[BoundsBlock],
     live: &[u8],
@@ -180,11 +248,16 @@ fn flat_512<const N: usize, const FAR: bool>(
         let (lo_x, lo_y) = load_rows(blocks, others, 0);
         let (lo_z, hi_x) = load_rows(blocks, others, 1);
         let (hi_y, hi_z) = load_rows(blocks, others, 2);
-        let (lo_x, lo_y, lo_z) = (_mm512_sub_ps(lo_x, ex), _mm512_sub_ps(lo_y, ey), _mm512_sub_ps(lo_z, ez));
-        let (hi_x, hi_y, hi_z) = (_mm512_sub_ps(hi_x, ex), _mm512_sub_ps(hi_y, ey), _mm512_sub_ps(hi_z, ez));
+        let near = |x, e| if GUARDED { _mm512_sub_ps(x, e) } else { x };
+        let (lo_x, lo_y, lo_z) = (near(lo_x, ex), near(lo_y, ey), near(lo_z, ez));
+        let (hi_x, hi_y, hi_z) = (near(hi_x, ex), near(hi_y, ey), near(hi_z, ez));
         let size = |lo, hi| _mm512_add_ps(_mm512_abs_ps(lo), _mm512_abs_ps(hi));
-        let total = _mm512_add_ps(_mm512_add_ps(size(lo_x, hi_x), size(lo_y, hi_y)), size(lo_z, hi_z));
-        let below = _mm512_mul_ps(total, minus_guard);
+        let below = if GUARDED {
+            let total = _mm512_add_ps(_mm512_add_ps(size(lo_x, hi_x), size(lo_y, hi_y)), size(lo_z, hi_z));
+            _mm512_mul_ps(total, minus_guard)
+        } else {
+            _mm512_setzero_ps()
+        };
         let a = [lo_x, lo_y, lo_z, hi_x, hi_y, hi_z, ex, ex];
         let mut left = u32::from(live[at] & !outside[at]);
         if second > at {

@@ -15,8 +15,12 @@ pub mod frustum;
 pub mod frustum_arithmetic;
 pub mod frustum_exact;
 pub mod frustum_f64;
+#[cfg(target_arch = "x86_64")]
+pub mod frustum_f64_x86;
 pub mod frustum_filtered;
 pub mod frustum_fixed;
+#[cfg(target_arch = "x86_64")]
+pub mod frustum_fixed_x86;
 pub mod frustum_planes;
 pub mod frustum_relative;
 pub mod frustum_scalar;

@@ -6,6 +6,7 @@ mod back_face;
 mod build;
 mod cones;
 mod facing;
+mod fixed;
 mod frustum;
 mod kernels;
 mod masks;

@@ -1,8 +1,15 @@
 //! Every kernel gives the bits of the scalar twin, on any input.
 
+use super::arithmetics::views;
 use super::build::{Rng, blocks, camera};
 use cullmark::culling::frustum::kernels;
+use cullmark::culling::frustum_f64::{self, Planes64};
+use cullmark::culling::frustum_filtered::{self, Signs};
+use cullmark::culling::frustum_fixed::{self, FixedBlock, FixedPlanes};
 use cullmark::culling::frustum_planes::{FramePlanes, PlaneMasks};
+use cullmark::culling::frustum_relative::kernels_of;
+use cullmark::culling::frustum_scalar::value;
+use cullmark::culling::frustum_world;
 use cullmark::math::{Box32, Camera, DVec3, Pose, Projection, Vec3, View};
 
 /// Random boxes, then boxes that touch planes, then everything that is not a box.
@@ -158,6 +165,93 @@ fn a_box_with_any_nan_or_infinite_bound_is_kept() {
                 lo.lo[axis] = bad;
                 hi.hi[axis] = bad;
                 assert!(keeps(lo) && keeps(hi), "{} axis {axis} {bad}", kernel.name);
+            }
+        }
+    }
+}
+
+/// Compares what `kernels` (the last is the twin) say of random blocks and planes.
+fn same_bits<K, B, M: Default + PartialEq + std::fmt::Debug>(
+    rng: &mut Rng,
+    kernels: &[(&str, K)],
+    blocks: &[B],
+    judge: impl Fn(&K, &B, u8, bool, &mut M) -> u8,
+) {
+    for (i, block) in blocks.iter().enumerate() {
+        let wanted = if i % 3 == 0 { 0b1_1111 } else { rng.bits() as u8 & 0b1_1111 };
+        let of = |(_, kernel): &(&str, K)| {
+            let mut masks = M::default();
+            let told = judge(kernel, block, wanted, i % 2 == 0, &mut masks);
+            (masks, told)
+        };
+        let want = of(kernels.last().unwrap());
+        kernels.iter().for_each(|kernel| assert_eq!(of(kernel), want, "{} on block {i}", kernel.0));
+    }
+}
+
+#[test]
+fn the_kernels_of_every_arithmetic_agree_with_their_twins() {
+    let mut rng = Rng::new(24);
+    let (bounds, _) = blocks(&nasty_boxes(&mut rng, 1600));
+    let fixed: Vec<_> = bounds.iter().map(FixedBlock::new).collect();
+    for (view, origin) in views(&mut rng) {
+        let double = Planes64::new(&view, origin);
+        same_bits(
+            &mut rng,
+            &frustum_f64::kernels(),
+            &bounds,
+            |kernel, block, planes, inside, masks: &mut PlaneMasks| {
+                kernel(&double, block, planes, inside, masks);
+                0
+            },
+        );
+        let whole = FixedPlanes::new(&view, origin);
+        same_bits(
+            &mut rng,
+            &frustum_fixed::kernels(),
+            &fixed,
+            |kernel, block, planes, inside, masks: &mut PlaneMasks| kernel(&whole, block, planes, inside, masks),
+        );
+        let single = FramePlanes::new(&view, origin);
+        same_bits(
+            &mut rng,
+            &frustum_filtered::kernels(),
+            &bounds,
+            |kernel, block, planes, inside, signs: &mut Signs| {
+                kernel(&single, block, planes, inside, signs);
+                0
+            },
+        );
+    }
+}
+
+/// `f32_world`: the kernels without a guard against a p-vertex test as one would write it.
+#[test]
+fn the_unguarded_kernels_are_the_plain_test_in_world_coordinates() {
+    let mut rng = Rng::new(25);
+    let boxes = nasty_boxes(&mut rng, 1603);
+    for (view, origin) in views(&mut rng) {
+        let world: Vec<_> = boxes.iter().map(|b| frustum_world::world_box(b, origin)).collect();
+        let (bounds, live) = blocks(&world);
+        let frame = frustum_world::planes(&view);
+        let plain = |b: &Box32| {
+            frame.planes[..frame.count].iter().any(|plane| {
+                let p = [0, 1, 2].map(|i| if plane.normal[i] >= 0.0 { b.hi[i] } else { b.lo[i] });
+                value(plane, &[p[0], p[1], p[2], 0.0, 0.0, 0.0], &[0, 1, 2], plane.d_out) < 0.0
+            })
+        };
+        let want: Vec<bool> = world.iter().map(plain).collect();
+        for kernel in kernels_of::<false>() {
+            let mut outside = vec![0; bounds.len()];
+            (kernel.flat)(&frame, &bounds, &live, &mut outside);
+            let mut masks = vec![PlaneMasks::default(); bounds.len()];
+            for (block, masks) in bounds.iter().zip(&mut masks) {
+                (kernel.block)(&frame, block, frame.all(), true, masks);
+            }
+            for (i, want) in want.iter().enumerate() {
+                let bit = |m: u8| m >> (i % 8) & 1 == 1;
+                assert_eq!(bit(outside[i / 8]), *want, "{} {:?}", kernel.name, world[i]);
+                assert_eq!(masks[i / 8].outside.iter().any(|m| bit(*m)), *want, "{} {:?}", kernel.name, world[i]);
             }
         }
     }
