@@ -10,6 +10,7 @@
 //! folder of real scenes, of which `city_1m` is used where it is there.
 
 use cullmark::culling::back_face::BackFace;
+use cullmark::culling::facing_columns::{Eye32, relative_points, world_planes};
 use cullmark::culling::facing_kernels::kernels;
 use cullmark::culling::{DrawList, Tally, Test, make_tests};
 use cullmark::hierarchy::Hierarchy;
@@ -94,6 +95,7 @@ fn compare(name: &str, scene: &Scene, turns: usize) {
         }
     }
     println!("\n{name}: {} triangles, {} kernels", scene.len(), kernels()[0].name);
+    kernels_alone(scene, &h, &view, turns);
     println!("{:<48} {:>8} {:>17} {:>8} {:>7} {:>8}", "method", "ns/tri", "[middle half]", "x naive", "B/tri", "kept");
     let base = quartiles(&mut times[0])[1];
     let names = std::iter::once("naive f64, a triangle at a time").chain(methods.iter().map(|m| m.0.as_str()));
@@ -109,6 +111,30 @@ fn compare(name: &str, scene: &Scene, turns: usize) {
             base / middle,
             *kept as f64 / n * 100.0
         );
+    }
+}
+
+/// The kernels without the ranges that a filter makes of their bits.
+fn kernels_alone(scene: &Scene, h: &Hierarchy, view: &View, turns: usize) {
+    let (planes, points) = (world_planes(scene, h), relative_points(scene, h));
+    let (world, relative) = (Eye32::world(view), Eye32::relative(view, h.origin));
+    let mut keep = vec![0u64; scene.len().div_ceil(64)];
+    let mut times = vec![[const { Vec::new() }; 2]; kernels().len()];
+    for _ in 0..turns {
+        for (k, times) in kernels().iter().zip(&mut times) {
+            keep.fill(!0);
+            let start = cpu_ns();
+            (k.plane)(&world, black_box(&planes), &mut keep);
+            times[0].push(cpu_ns() - start);
+            keep.fill(!0);
+            let start = cpu_ns();
+            (k.guarded)(&relative, black_box(&points), &mut keep);
+            times[1].push(cpu_ns() - start);
+        }
+    }
+    for (k, times) in kernels().iter().zip(&mut times) {
+        let [plane, guarded] = times.each_mut().map(|t| quartiles(t).map(|ns| ns / scene.len() as f64));
+        println!("{:<8} kernel alone, ns/tri: plane {plane:.3?}, difference with guard {guarded:.3?}", k.name);
     }
 }
 

@@ -70,6 +70,14 @@ fn rules_that_match_nothing_are_mistakes() {
                 "aabb, cube",
             ),
             (
+                "[[exclude]]\nculling = \"normal_mask:rays=view\"\nwhy = \"x\"",
+                16,
+                11,
+                "exclude.0.culling",
+                "is never view",
+                "leave the condition out",
+            ),
+            (
                 "[[exclude]]\nstructure = { kind = \"octree\", depth = { form = 3 } }\nwhy = \"x\"",
                 16,
                 42,
