@@ -29,21 +29,21 @@ pub mod scene;
 pub mod stats;
 pub mod structure;
 
-#[cfg(feature = "service")]
+#[cfg(feature = "manifest")]
 pub mod claim;
 #[cfg(feature = "service")]
 pub mod cli;
-#[cfg(feature = "service")]
+#[cfg(feature = "manifest")]
 pub mod manifest;
-#[cfg(feature = "service")]
+#[cfg(feature = "manifest")]
 pub mod matrix;
 #[cfg(feature = "service")]
 pub mod report;
-#[cfg(feature = "service")]
+#[cfg(feature = "manifest")]
 pub mod results;
 #[cfg(feature = "service")]
 pub mod store;
-#[cfg(feature = "service")]
+#[cfg(feature = "manifest")]
 pub mod sweep;
 #[cfg(feature = "service")]
 pub mod worker;

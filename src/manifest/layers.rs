@@ -5,13 +5,17 @@ use super::tree::{self, Data, Key, Node, Table, get};
 use crate::error::{Error, did_you_mean};
 use std::path::{Path, PathBuf};
 
-/// Reads `path` with its presets and lays `sets` over it. `None` when nothing
-/// could be read; mistakes are noted either way.
-pub fn read(mistakes: &mut Mistakes, path: &Path, sets: &[String]) -> Result<Option<Table>, Error> {
-    let text = std::fs::read_to_string(path).map_err(|e| {
+/// The text of the manifest itself.
+pub fn text(path: &Path) -> Result<String, Error> {
+    std::fs::read_to_string(path).map_err(|e| {
         Error::io(path, "cannot read the manifest", &e)
             .help("give the path of a TOML manifest, such as experiments/quick.toml")
-    })?;
+    })
+}
+
+/// Merges `text`, the content of `path`, with its presets and lays `sets` over it.
+/// `None` when nothing could be read; mistakes are noted either way.
+pub fn read(mistakes: &mut Mistakes, text: String, path: &Path, sets: &[String]) -> Option<Table> {
     let source = mistakes.sources.add(path, text, true);
     let mut stack = vec![identity(path)];
     let mut table = layer(mistakes, source, &mut stack);
@@ -24,7 +28,7 @@ pub fn read(mistakes: &mut Mistakes, path: &Path, sets: &[String]) -> Result<Opt
             mistakes.note(&place.unwrap_or(whole), "", e);
         }
     }
-    Ok(table)
+    table
 }
 
 /// So that `a.toml` and `./b/../a.toml` are one file when looking for cycles.

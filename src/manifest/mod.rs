@@ -81,8 +81,16 @@ impl Manifest {
     /// Every mistake, in the order of the text, each with file, line, column,
     /// key and a suggestion.
     pub fn load(path: &Path, sets: &[String]) -> Result<Manifest, Vec<Error>> {
+        Manifest::parse(layers::text(path).map_err(|e| vec![e])?, path, sets)
+    }
+
+    /// [`Manifest::load`] of a text at hand; what it names lies beside `path`.
+    ///
+    /// # Errors
+    /// Those of [`Manifest::load`].
+    pub fn parse(text: String, path: &Path, sets: &[String]) -> Result<Manifest, Vec<Error>> {
         let mut mistakes = Mistakes::new(Sources::default());
-        let table = layers::read(&mut mistakes, path, sets).map_err(|e| vec![e])?;
+        let table = layers::read(&mut mistakes, text, path, sets);
         let Some(table) = table else { return Err(mistakes.into_errors().1) };
         let manifest = decode(&mistakes, &table, path);
         let plain = mistakes.sources.0.len() == 1;

@@ -39,7 +39,7 @@ pub fn fingerprint(source: &SceneSource, winding: Winding, up: Up, scale: f64, w
             };
             for file in beside {
                 // A missing one is part of the identity too: it changes the scene or fails to load.
-                part(std::fs::read(&file).as_deref().unwrap_or(b"missing"));
+                part(read_beside(&file).as_deref().unwrap_or(b"missing"));
             }
         }
         SceneSource::Generated(spec) => {
@@ -79,31 +79,38 @@ pub fn describe(
 /// positive, a scene without a usable triangle.
 pub fn load(spec: &SceneSpec) -> Result<Scene> {
     let placement = Placement::of(spec)?;
-    let mut scene = match &spec.source {
-        SceneSource::File(path) => {
-            let bytes = read_file(path)?;
-            match Format::of(path, &bytes)? {
-                Format::Obj => obj::read(path, &bytes)?,
-                Format::Gltf => gltf::read(path, &bytes)?,
-            }
-        }
-        SceneSource::Generated(spec) => {
-            let mut scene = generate::make(spec)?.0.generate();
+    match &spec.source {
+        SceneSource::File(path) => load_bytes(spec, path, &read_file(path)?),
+        SceneSource::Generated(source) => {
+            let mut scene = generate::make(source)?.0.generate();
             scene.source_triangle_count = scene.source_triangle_count.max(scene.len() as u32);
             scene.report.triangles_in_file = u64::from(scene.source_triangle_count);
-            scene
+            finish(spec, &placement, scene)
         }
+    }
+}
+
+/// [`load`] of a file whose content is at hand; what it refers to lies beside `path`.
+///
+/// # Errors
+/// Those of [`load`].
+pub fn load_bytes(spec: &SceneSpec, path: &Path, bytes: &[u8]) -> Result<Scene> {
+    let placement = Placement::of(spec)?;
+    let scene = match Format::of(path, bytes)? {
+        Format::Obj => obj::read(path, bytes)?,
+        Format::Gltf => gltf::read(path, bytes)?,
     };
+    finish(spec, &placement, scene).map_err(|e| e.in_file(path))
+}
+
+fn finish(spec: &SceneSpec, placement: &Placement, mut scene: Scene) -> Result<Scene> {
     scene.name = spec.name.clone();
-    prepare(&mut scene, &placement, spec.winding, spec.weld);
+    prepare(&mut scene, placement, spec.winding, spec.weld);
     if scene.is_empty() {
-        let mut e = Error::new(match scene.report.triangles_in_file {
+        let e = Error::new(match scene.report.triangles_in_file {
             0 => "the scene has no triangles".to_string(),
             n => format!("none of the {n} triangles is usable ({})", scene.report.warnings.join("; ")),
         });
-        if let SceneSource::File(path) = &spec.source {
-            e = e.in_file(path);
-        }
         return Err(
             e.help("a scene needs faces with area and finite coordinates; `cullmark scene info` shows what is there")
         );
@@ -178,6 +185,16 @@ impl Format {
             Format::Obj => "obj",
             Format::Gltf => "gltf",
         }
+    }
+}
+
+/// What a scene file refers to. The name is the file's, not the user's, so devices
+/// and pipes, which may never end, are refused.
+pub(super) fn read_beside(path: &Path) -> std::io::Result<Vec<u8>> {
+    if std::fs::metadata(path)?.is_file() {
+        std::fs::read(path)
+    } else {
+        Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file"))
     }
 }
 

@@ -4,6 +4,7 @@
 //! whose library is missing, and says what is wrong but not where. When tobj
 //! refuses, [`locate`] finds the line.
 
+use super::load::read_beside;
 use super::mtl;
 use super::{LoadReport, Scene};
 use crate::error::{Error, Result};
@@ -243,7 +244,7 @@ fn name_materials(scene: &mut Scene, path: &Path, survey: &Survey) {
     let mut all_read = !survey.libraries.is_empty();
     for (line, name) in &survey.libraries {
         for file in mtl::resolve(folder, name) {
-            match std::fs::read(&file) {
+            match read_beside(&file) {
                 Ok(text) => known.extend(mtl::parse(&text)),
                 Err(e) => {
                     all_read = false;

@@ -9,6 +9,7 @@ mod generators;
 mod manifest;
 mod oracle;
 mod preflight;
+mod readers;
 mod report;
 mod scenes;
 mod store;

@@ -4,22 +4,26 @@
 use crate::error::{Error, Result};
 use gltf::accessor::{DataType, Dimensions, sparse};
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::rc::Rc;
 
 /// Without a buffer view an accessor is all zeros, at any length its author likes.
-const MAX_IMPLIED: usize = 1 << 26;
+/// So many are allowed in a file, all accessors together: sparse values over
+/// zeros are for small changes, and a few hundred bytes must not ask for gigabytes.
+const MAX_IMPLIED: usize = 1 << 20;
 
 pub struct Accessors<'a> {
     buffers: &'a [Cow<'a, [u8]>],
     /// Files share accessors between primitives, so each is decoded once.
     positions: HashMap<usize, Rc<Vec<[f32; 3]>>>,
     indices: HashMap<usize, Rc<Vec<u32>>>,
+    implied: Cell<usize>,
 }
 
 impl<'a> Accessors<'a> {
     pub fn new(buffers: &'a [Cow<'a, [u8]>]) -> Accessors<'a> {
-        Accessors { buffers, positions: HashMap::new(), indices: HashMap::new() }
+        Accessors { buffers, positions: HashMap::new(), indices: HashMap::new(), implied: Cell::new(0) }
     }
 
     pub fn positions(&mut self, accessor: &gltf::Accessor) -> Result<Rc<Vec<[f32; 3]>>> {
@@ -54,10 +58,14 @@ impl<'a> Accessors<'a> {
         let at = |e: Error| e.key(format!("accessor {}", a.index()));
         let mut values = match a.view() {
             Some(view) => self.items(&view, a.offset(), a.count(), size, &item).map_err(at)?,
-            None if a.count() > MAX_IMPLIED => {
-                return Err(at(Error::new(format!("{} values without data", a.count())).help("export the file again")));
+            None => {
+                self.implied.set(self.implied.get().saturating_add(a.count()));
+                if self.implied.get() > MAX_IMPLIED {
+                    let message = format!("{} values without data", self.implied.get());
+                    return Err(at(Error::new(message).help("export the file again")));
+                }
+                vec![T::default(); a.count()]
             }
-            None => vec![T::default(); a.count()],
         };
         if let Some(sparse) = a.sparse() {
             let (i, v) = (sparse.indices(), sparse.values());

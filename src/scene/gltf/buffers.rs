@@ -1,6 +1,7 @@
 //! The bytes of a glTF: GLB chunks, files beside it, base64 data URIs.
 
 use crate::error::{Error, Result};
+use crate::scene::load::read_beside;
 use base64::Engine;
 use gltf::buffer::Source;
 use std::borrow::Cow;
@@ -68,7 +69,7 @@ pub fn load<'a>(document: &gltf::Document, path: &Path, blob: Option<&'a [u8]>) 
                 }
                 Source::Uri(uri) => {
                     let file = beside(path, uri, n)?;
-                    let bytes = std::fs::read(&file).map_err(|e| {
+                    let bytes = read_beside(&file).map_err(|e| {
                         Error::new(format!("buffer {n} is in {}, which cannot be read: {e}", file.display()))
                             .help("keep a .gltf together with its .bin files, or pack them into one .glb")
                     })?;
