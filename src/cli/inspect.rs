@@ -7,7 +7,7 @@ use super::scene::{SceneOptions, path_file_spec, spec_of};
 use crate::culling::{self, Class, DrawList, Removes, Tally};
 use crate::error::{Error, Result};
 use crate::manifest::axes;
-use crate::math::{Camera, Pose, Projection, View};
+use crate::math::{Arithmetic, Camera, Pose, Projection, View};
 use crate::oracle::image::Grid;
 use crate::oracle::{FrameTruth, Losses, losses, verdict};
 use crate::record::{PathSource, PathSpec, SceneSpec};
@@ -15,6 +15,7 @@ use crate::registry::{Spec, format_sum, parse_sum};
 use crate::runner::{Setup, submitted};
 use crate::scene::{load, walkthrough};
 use crate::structure;
+use clap::builder::PossibleValuesParser;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -41,6 +42,9 @@ pub struct Args {
     /// Order of visit: auto, flat or depth_first
     #[arg(long, value_name = "SPEC", default_value = "auto")]
     walk: String,
+    /// Numbers in which tests are evaluated that state none
+    #[arg(long, value_name = "NAME", default_value = "f32_relative", value_parser = PossibleValuesParser::new(Arithmetic::NAMES))]
+    arithmetic: String,
     /// Full vertical field of view of a perspective camera, degrees
     #[arg(long, value_name = "DEG", default_value_t = 60.0)]
     fov_y_deg: f64,
@@ -144,7 +148,9 @@ struct Method {
 impl Method {
     fn parse(args: &Args) -> Result<Method> {
         let structure = structure::make(&Spec::parse(&args.structure)?).map_err(|e| e.key("--structure"))?.1;
-        let culling = culling::make_tests(&parse_sum(&args.culling)?).map_err(|e| e.key("--culling"))?.1;
+        let mut culling = culling::make_tests(&parse_sum(&args.culling)?).map_err(|e| e.key("--culling"))?.1;
+        let arithmetic = Arithmetic::named(&args.arithmetic).expect("one of the possible values");
+        culling.iter_mut().for_each(|part| culling::state_arithmetic(part, arithmetic));
         let walk = match (args.walk.trim(), axes::axis("walk").and_then(|a| a.auto)) {
             ("auto", Some(auto)) => auto(&structure),
             (text, _) => Spec::parse(text)?,

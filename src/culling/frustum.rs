@@ -23,6 +23,7 @@ pub const ENTRY: Entry<dyn Test> = Entry {
     about: "boxes against the view frustum, f32 relative to the camera with a proved error bound",
     revision: 1,
     params: &[
+        ARITHMETIC,
         Param {
             name: "last_plane",
             default: Allowed::Bool(false),

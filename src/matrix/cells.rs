@@ -24,7 +24,12 @@ pub struct Pool {
     values: Vec<(usize, AxisValue, Vec<u32>)>,
     numbers: HashMap<(usize, String), u32>,
     autos: HashMap<(u32, u32), u32>,
+    /// What an axis (by position) is beside a culling, where that leaves no choice.
+    settled: HashMap<(u32, usize), Option<u32>>,
 }
+
+/// Position of the axis `culling`.
+const CULLING: usize = 1;
 
 impl Pool {
     fn number(&mut self, axis: usize, value: &AxisValue) -> u32 {
@@ -48,7 +53,8 @@ impl Pool {
         &self.values[number as usize].2
     }
 
-    /// `auto` made concrete beside the cell's structure.
+    /// `auto` made concrete beside the cell's structure; an axis that the cell's
+    /// culling does not take gets its usual value.
     fn settle(&mut self, cell: &mut Cell) {
         for (i, axis) in AXES.iter().enumerate() {
             let Some(auto) = axis.auto else { continue };
@@ -66,6 +72,17 @@ impl Pool {
                     n
                 }
             };
+        }
+        let culling = cell.values[CULLING];
+        for (i, axis) in AXES.iter().enumerate() {
+            let Some(settled) = axis.settled else { continue };
+            let known = self.settled.get(&(culling, i)).copied();
+            let only = known.unwrap_or_else(|| {
+                let only = settled(self.value(culling)).map(|spec| self.number(i, &vec![spec]));
+                self.settled.insert((culling, i), only);
+                only
+            });
+            cell.values[i] = only.unwrap_or(cell.values[i]);
         }
     }
 

@@ -1,5 +1,6 @@
 //! Short names of a run's parts, without parameters that have their default.
 
+use crate::claim::axis_value;
 use crate::manifest::axes::{AXES, axis};
 use crate::record::RunSpec;
 use crate::registry::Spec;
@@ -13,13 +14,18 @@ pub struct Labels {
     pub walk: String,
     /// The walk is not the structure's own.
     pub walk_is_special: bool,
+    /// Values of further axes by name, the usual ones too.
+    further: Vec<(&'static str, String)>,
+    /// Those that are not usual: `f64`.
+    special: Vec<String>,
 }
 
 impl Labels {
-    /// `octree × frustum`, the walk only where it is not the usual one.
+    /// `octree × frustum`, the walk and further axes only where they are not the usual ones.
     pub fn cell(&self) -> String {
         let walk = if self.walk_is_special { format!(" × {}", self.walk) } else { String::new() };
-        format!("{} × {}{walk}", self.structure, self.culling)
+        let special: String = self.special.iter().map(|s| format!(" × {s}")).collect();
+        format!("{} × {}{walk}{special}", self.structure, self.culling)
     }
 
     /// By axis name; an unknown axis has no label.
@@ -30,7 +36,9 @@ impl Labels {
             "structure" => &self.structure,
             "culling" => &self.culling,
             "walk" => &self.walk,
-            _ => return String::new(),
+            _ => {
+                return self.further.iter().find(|(name, _)| *name == axis).map(|(_, l)| l.clone()).unwrap_or_default();
+            }
         }
         .clone()
     }
@@ -46,6 +54,8 @@ pub fn labels(run: &RunSpec) -> Labels {
         culling: label("culling", &run.culling),
         walk,
         walk_is_special: usual.as_ref() != Some(&run.walk),
+        further: AXES[3..].iter().map(|a| (a.name, label(a.name, &axis_value(run, a.name)))).collect(),
+        special: run.further(),
     }
 }
 
