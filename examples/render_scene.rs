@@ -25,7 +25,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let up = place("up").filter(|i| rest.get(i + 1).is_some_and(|w| w == "y")).map_or(Up::Z, |_| Up::Y);
         let (source, scale) = (SceneSource::File(spec.into()), place("scale").map_or(Ok(1.0), |i| number(i + 1))?);
         let (name, winding) = (spec.clone(), Winding::Ccw);
-        load::load(&SceneSpec { name, source, winding, up, scale, weld: false, fingerprint: String::new() })?
+        load::load(&SceneSpec {
+            name,
+            source,
+            winding,
+            up,
+            scale,
+            weld: false,
+            offset_m: [0.0; 3],
+            fingerprint: String::new(),
+        })?
     } else {
         generate::make(&Spec::parse(spec)?)?.0.generate()
     };

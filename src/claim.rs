@@ -2,8 +2,8 @@
 //! writes and the report judges. Plain types, no I/O.
 
 use crate::error::{Error, Result};
-use crate::math::{Arithmetic, arithmetic};
-use crate::record::RunSpec;
+use crate::math::Arithmetic;
+use crate::record::{RunSpec, cameras};
 use crate::registry::{Spec, Value};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -156,8 +156,11 @@ pub fn axis_value(run: &RunSpec, axis: &str) -> Vec<Spec> {
         "structure" => vec![run.structure.clone()],
         "culling" => run.culling.clone(),
         "walk" => vec![run.walk.clone()],
-        // Not stored where it is the default, so that ids stay what they were before the axis.
-        arithmetic::NAME if !run.axes.contains_key(axis) => vec![Spec::new(Arithmetic::default().name())],
+        // What is usual is not stored: the default arithmetic, the camera of the section.
+        "arithmetic" => {
+            vec![run.axes.get(axis).cloned().unwrap_or_else(|| Spec::new(Arithmetic::default().name()))]
+        }
+        "camera" => vec![run.axes.get(axis).cloned().unwrap_or_else(|| cameras::spec_of(&run.camera))],
         other => run.axes.get(other).cloned().into_iter().collect(),
     }
 }
@@ -188,6 +191,9 @@ pub struct Condition {
     pub op: &'static str,
     pub values: Vec<Value>,
 }
+
+/// Between the name of a swept scene or path and the value that tells it from the others.
+pub const FAMILY: char = '@';
 
 /// Longest first, so that `<=` is not read as `<`.
 const OPERATORS: &[&str] = &["!=", "<=", ">=", "=", "<", ">"];
@@ -247,7 +253,9 @@ fn assign(parts: &[Part], value: &[Spec], taken: &mut Vec<bool>) -> bool {
 
 impl Part {
     pub fn matches(&self, spec: &Spec) -> bool {
-        wildcard(&self.kind, &spec.kind)
+        // The plain name of a family selects all its members: `hall` is `hall@offset_m=1e4` too.
+        let family = spec.kind.split_once(FAMILY).map(|(family, _)| family);
+        (wildcard(&self.kind, &spec.kind) || family.is_some_and(|f| wildcard(&self.kind, f)))
             && self.conditions.iter().all(|c| spec.params.get(&c.key).is_some_and(|v| c.holds(v)))
     }
 }
@@ -348,6 +356,12 @@ mod tests {
             // Each part takes a part of its own: `*_mask` must not take the only `normal_mask`.
             ("*_mask+normal_mask", "normal_mask+octant_mask", true),
             ("normal_mask+normal_mask", "normal_mask+octant_mask", false),
+            ("hall", "hall@offset_m=1e4", true),
+            ("h*l", "hall@offset_m=1e4", true),
+            ("hall@*", "hall@offset_m=1e4", true),
+            ("hall@offset_m=1e4", "hall@offset_m=1e4", true),
+            ("hall@offset_m=1", "hall@offset_m=1e4", false),
+            ("hal", "hall@offset_m=1e4", false),
         ] {
             assert_eq!(fits(selector, value), expected, "{selector} on {value}");
         }

@@ -15,6 +15,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+pub mod cameras;
+pub mod numbers;
+
 /// Where triangles come from and how they are read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SceneSpec {
@@ -26,6 +29,9 @@ pub struct SceneSpec {
     pub scale: f64,
     /// Join vertices at the same position (exact equality after scaling).
     pub weld: bool,
+    /// Moves mesh and path together, after the scale.
+    #[serde(default, skip_serializing_if = "is_nowhere")]
+    pub offset_m: [f64; 3],
     /// Identity of source and options ([`crate::scene::load::fingerprint`]):
     /// equal fingerprints mean equal scenes.
     pub fingerprint: String,
@@ -53,6 +59,14 @@ pub enum Winding {
 pub enum Up {
     Y,
     Z,
+}
+
+impl SceneSpec {
+    /// How far the scene was moved.
+    pub fn distance_m(&self) -> f64 {
+        let [x, y, z] = self.offset_m;
+        numbers::tidy(libm::hypot(libm::hypot(x, y), z))
+    }
 }
 
 /// A walkthrough: camera poses frame by frame.
@@ -132,6 +146,10 @@ fn is_zero(x: &u32) -> bool {
     *x == 0
 }
 
+fn is_nowhere(offset_m: &[f64; 3]) -> bool {
+    *offset_m == [0.0; 3]
+}
+
 /// Derived, always labelled as modelled:
 /// `frame_ms_model = culling + index_ns * indices + draw_call_ns * calls`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -157,7 +175,8 @@ pub struct RunSpec {
     /// Parts of the sum; empty is `none`.
     pub culling: Vec<Spec>,
     pub walk: Spec,
-    /// Other axes by name, for registries still to come.
+    /// Other axes by name, where their value is not the usual one: `arithmetic`, and
+    /// `camera` where it is not that of the manifest's section.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub axes: BTreeMap<String, Spec>,
     /// Revision of each algorithm used (`structure.octree` -> 1).
@@ -189,7 +208,13 @@ impl RunSpec {
             structure: self.structure.to_string(),
             culling: self.culling.iter().map(Spec::to_string).collect(),
             walk: self.walk.to_string(),
-            axes: self.axes.iter().map(|(k, v)| (k.clone(), v.to_string())).collect(),
+            // The camera stands above: however a manifest names it, it is the same.
+            axes: self
+                .axes
+                .iter()
+                .filter(|(k, _)| *k != cameras::AXIS)
+                .map(|(k, v)| (k.clone(), v.to_string()))
+                .collect(),
             revisions: &self.revisions,
         })
     }

@@ -97,8 +97,9 @@ impl RunResult {
         &self.spec.scene.name
     }
 
-    /// `octree:depth=4 x frustum+normal_mask`, the walk only when it matters.
+    /// `octree:depth=4 × frustum+normal_mask`, further axes only where they are not the usual ones.
     pub fn label(&self) -> String {
-        format!("{} × {}", self.structure, self.culling)
+        let further: String = self.spec.further().iter().map(|l| format!(" × {l}")).collect();
+        format!("{} × {}{further}", self.structure, self.culling)
     }
 }

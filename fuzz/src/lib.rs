@@ -113,6 +113,7 @@ fn plain(path: &Path) -> SceneSpec {
         winding: Winding::Ccw,
         up: Up::Z,
         scale: 1.0,
+        offset_m: [0.0; 3],
         weld: false,
         fingerprint: String::new(),
     }

@@ -21,16 +21,22 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     match read(&args.manifest, &args.set) {
         Ok((manifest, matrix)) => {
-            let (runs, excluded, claims) = (matrix.runs.len(), matrix.excluded_runs.len(), manifest.claims.len());
+            let (runs, excluded) = (matrix.runs.len(), matrix.excluded_runs.len());
+            let (claims, sweeps) = (manifest.claims.len(), manifest.sweeps.len());
             if args.json {
                 let value = serde_json::json!({
                     "ok": true, "study": manifest.study.name, "runs": runs, "excluded": excluded,
-                    "duplicates": matrix.duplicates, "claims": claims, "scenes": manifest.scenes.len(),
+                    "duplicates": matrix.duplicates, "claims": claims, "sweeps": sweeps, "scenes": manifest.scenes.len(),
                 });
                 println!("{value:#}");
             } else {
+                let charts = match sweeps {
+                    0 => String::new(),
+                    1 => ", 1 sweep".to_string(),
+                    n => format!(", {n} sweeps"),
+                };
                 println!(
-                    "ok: {}: {runs} runs, {excluded} excluded, {} duplicates left out, {claims} claims",
+                    "ok: {}: {runs} runs, {excluded} excluded, {} duplicates left out, {claims} claims{charts}",
                     manifest.study.name, matrix.duplicates
                 );
             }

@@ -10,7 +10,7 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(
     after_help = "Ratios are second over first: below 1 the second is lower. Cells match by scene, path, camera,\n\
-    structure, culling and walk with all parameters. Times of different machine classes are not compared."
+    structure, culling, walk and arithmetic with all parameters. Times of different machine classes are not compared."
 )]
 pub struct Args {
     /// Name of a study, `name@series`, or its manifest

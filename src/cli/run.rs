@@ -178,6 +178,7 @@ fn submission(args: &Args, manifest: &Manifest, matrix: &Matrix, machine_class: 
         title: manifest.study.title.clone(),
         manifest_toml: manifest.source_text.clone(),
         claims_json: serde_json::to_string(&manifest.claims()).expect("claims are plain data"),
+        sweeps_json: serde_json::to_string(&manifest.sweeps()).expect("sweeps are plain data"),
         consolidate_frames: manifest.timing.consolidate_frames,
         policy: manifest.repeat.clone(),
         machine_class,

@@ -4,6 +4,7 @@ use crate::math::DVec3;
 use crate::preview;
 use crate::record::{PathSource, PathSpec, SceneSource, SceneSpec, Up, Winding};
 use crate::registry::Spec;
+use crate::scene::placement::along;
 use crate::scene::{Scene, load, walkthrough, winding, write};
 use anyhow::Context;
 use std::path::{Path, PathBuf};
@@ -38,6 +39,9 @@ pub struct SceneOptions {
     /// Metres a unit of the file
     #[arg(long, default_value_t = 1.0)]
     pub scale: f64,
+    /// Move scene and path: metres along (6, -3, 2) / 7, or X,Y,Z
+    #[arg(long, value_parser = parse_offset, default_value = "0", value_name = "M|X,Y,Z", allow_hyphen_values = true)]
+    pub offset_m: [f64; 3],
     /// Which side of a face is its front
     #[arg(long, value_parser = parse_winding, default_value = "ccw", value_name = "ccw|cw|two_sided")]
     pub winding: Winding,
@@ -84,7 +88,8 @@ pub fn run(verb: Verb) -> anyhow::Result<ExitCode> {
     match verb {
         Verb::Info(a) => info(&a),
         Verb::Generate(a) => {
-            let spec = spec_of(&a.spec, &SceneOptions { up: None, scale: 1.0, winding: Winding::Ccw, weld: false })?;
+            let plain = SceneOptions { up: None, scale: 1.0, offset_m: [0.0; 3], winding: Winding::Ccw, weld: false };
+            let spec = spec_of(&a.spec, &plain)?;
             if matches!(spec.source, SceneSource::File(_)) {
                 anyhow::bail!("`{}` is a file, not a generator\n  help: use `cullmark scene convert`", a.spec);
             }
@@ -114,7 +119,17 @@ pub fn spec_of(text: &str, o: &SceneOptions) -> anyhow::Result<SceneSpec> {
     } else {
         (text.to_string(), SceneSource::Generated(Spec::parse(text)?))
     };
-    Ok(load::describe(&name, source, o.winding, o.up, o.scale, o.weld)?)
+    Ok(load::moved(load::describe(&name, source, o.winding, o.up, o.scale, o.weld)?, o.offset_m))
+}
+
+pub fn parse_offset(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|t| t.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+    match numbers.as_deref() {
+        Some([distance_m]) if *distance_m >= 0.0 => Ok(along(*distance_m)),
+        Some([x, y, z]) => Ok([*x, *y, *z]),
+        _ => Err("must be metres from 0, such as 1e4, or three numbers X,Y,Z".to_string()),
+    }
 }
 
 pub fn parse_up(text: &str) -> Result<Up, String> {

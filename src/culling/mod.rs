@@ -317,13 +317,19 @@ pub fn make_tests_in(specs: &[Spec], arithmetic: Arithmetic) -> Result<Sum> {
     for spec in specs {
         let (entry, spec) = find("culling test", TESTS, spec)?;
         let mut own = spec.clone();
-        if knows_arithmetic(&spec.kind) && !own.params.contains_key(arithmetic::NAME) {
-            own.params.insert(arithmetic::NAME.to_string(), Value::Text(arithmetic.name().to_string()));
-        }
+        state_arithmetic(&mut own, arithmetic);
         tests.push((entry.make)(&own));
         resolved.push(spec);
     }
     Ok((tests, resolved))
+}
+
+/// Writes `arithmetic` into a part that takes one and states none.
+pub fn state_arithmetic(part: &mut Spec, arithmetic: Arithmetic) {
+    if knows_arithmetic(&part.kind) {
+        let stated = || Value::Text(arithmetic.name().to_string());
+        part.params.entry(arithmetic::NAME.to_string()).or_insert_with(stated);
+    }
 }
 
 /// Whether the test `kind` is evaluated in the arithmetic of the axis.

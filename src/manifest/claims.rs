@@ -35,7 +35,7 @@ pub fn read(top: &mut Fields, names: &Names) -> Vec<Rule<Claim>> {
 fn claim(mut f: Fields, id: Option<String>, names: &Names) -> Option<Claim> {
     let text = f.sentence("text", "quote or restate what the source says");
     let source = f.sentence("source", "name paper and figure, such as \"Serpa & Rodrigues 2014, fig. 3\"");
-    let metric = metric(&mut f);
+    let metric = metric(&mut f, "metric", "what is compared, such as metric = \"total_cull_ms\"");
     let numerator = selection(&mut f, "numerator", names);
     if !f.has("relation") {
         f.missing(
@@ -92,8 +92,9 @@ fn claim(mut f: Fields, id: Option<String>, names: &Names) -> Option<Claim> {
     })
 }
 
-fn metric(f: &mut Fields) -> Option<String> {
-    let text = f.sentence("metric", "what is compared, such as metric = \"total_cull_ms\"")?;
+/// A name of [`METRICS`] under the key `name`.
+pub fn metric(f: &mut Fields, name: &'static str, help: &str) -> Option<String> {
+    let text = f.sentence(name, help)?;
     if METRICS.iter().any(|m| m.name == text) {
         return Some(text);
     }
@@ -103,8 +104,8 @@ fn metric(f: &mut Fields) -> Option<String> {
         Some(near) => format!("did you mean \"{near}\"?"),
         None => format!("known: {}", names.collect::<Vec<_>>().join(", ")),
     });
-    let place = f.get("metric")?.place.clone();
-    f.note(&place, "metric", e);
+    let place = f.get(name)?.place.clone();
+    f.note(&place, name, e);
     None
 }
 

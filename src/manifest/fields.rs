@@ -55,7 +55,7 @@ impl<'a> Fields<'a> {
         self.note(&self.place, name, Error::new("is missing").help(help));
     }
 
-    fn wrong<T>(&self, node: &Node, name: &str, want: &str) -> Option<T> {
+    pub fn wrong<T>(&self, node: &Node, name: &str, want: &str) -> Option<T> {
         let text = self.mistakes.sources.text(&node.place);
         let got = match &node.data {
             Data::Array(_) | Data::Table(_) => node.noun().to_string(),

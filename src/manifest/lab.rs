@@ -3,7 +3,7 @@
 
 use super::axes::{Part, parts};
 use crate::error::Result;
-use crate::record::{PathSource, SceneSource, Up, Winding};
+use crate::record::{PathSource, SceneSource, SceneSpec, Up, Winding};
 use crate::registry::Spec;
 use crate::scene::{generate, load, walkthrough};
 
@@ -26,6 +26,10 @@ pub fn check_walker(spec: &Spec) -> Result<Spec> {
 
 pub fn scene_fingerprint(source: &SceneSource, winding: Winding, up: Up, scale: f64, weld: bool) -> Result<String> {
     load::fingerprint(source, winding, up, scale, weld)
+}
+
+pub fn moved(scene: SceneSpec, offset_m: [f64; 3]) -> SceneSpec {
+    load::moved(scene, offset_m)
 }
 
 pub fn path_fingerprint(source: &PathSource, scene: &str) -> Result<String> {

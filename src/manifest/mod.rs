@@ -6,6 +6,8 @@
 
 pub mod axes;
 mod claims;
+mod entries;
+mod families;
 mod fields;
 mod lab;
 mod layers;
@@ -15,12 +17,14 @@ mod scenes;
 mod sections;
 mod selections;
 pub mod source;
+pub mod sweeps;
 mod tree;
 
 use crate::claim::Claim;
 use crate::error::Error;
 use crate::math::Camera;
 use crate::record::{Accuracy, PathSpec, RepeatPolicy, SceneSpec, TimeModel};
+use crate::sweep::Sweep;
 use axes::AxisValues;
 use fields::Fields;
 pub use rules::{Exclude, Include, Rule, Zip};
@@ -48,6 +52,7 @@ pub struct Manifest {
     pub include: Vec<Include>,
     pub exclude: Vec<Exclude>,
     pub claims: Vec<Rule<Claim>>,
+    pub sweeps: Vec<Rule<sweeps::Drawn>>,
     /// The manifest after `extends` and `--set`, as TOML.
     pub source_text: String,
     /// Texts behind the places of the rules, for errors found later.
@@ -114,6 +119,10 @@ impl Manifest {
     pub fn claims(&self) -> Vec<Claim> {
         self.claims.iter().map(|rule| rule.value.clone()).collect()
     }
+
+    pub fn sweeps(&self) -> Vec<Sweep> {
+        self.sweeps.iter().map(|rule| rule.value.sweep.clone()).collect()
+    }
 }
 
 /// `None` when something is missing that the rest cannot do without; that is noted.
@@ -126,10 +135,13 @@ fn decode(mistakes: &Mistakes, table: &tree::Table, path: &Path) -> Option<Manif
     let accuracy = sections::accuracy(&mut fields);
     let model = sections::model(&mut fields);
     let scenes::Scenes { scenes, paths, names } = scenes::read(&mut fields);
-    let matrix = rules::matrix(&mut fields, &names);
-    let include = rules::includes(&mut fields, &names);
+    // A section with mistakes stops the manifest; its default lets the rest be checked.
+    let section = camera.unwrap_or_default();
+    let matrix = rules::matrix(&mut fields, &names, &section);
+    let include = rules::includes(&mut fields, &names, &section);
     let exclude = rules::excludes(&mut fields, &names);
     let claims = claims::read(&mut fields, &names);
+    let sweeps = sweeps::read(&mut fields);
     fields.known("extends");
     fields.finish();
     let matrix = matrix?;
@@ -150,6 +162,7 @@ fn decode(mistakes: &Mistakes, table: &tree::Table, path: &Path) -> Option<Manif
         include,
         exclude,
         claims,
+        sweeps,
         source_text: String::new(),
         sources: Sources::default(),
         matrix_place: matrix.place,

@@ -2,7 +2,8 @@
 //! about cells. Selections are checked here as far as names go; whether they
 //! select anything is known once the matrix is expanded.
 
-use super::axes::{AXES, Axis, AxisValues, axis, axis_names, default_values, read_values, unknown_axis};
+use super::axes::{AXES, Axis, AxisValues, axis, axis_names, default_values, unknown_axis};
+use super::entries::read_values;
 use super::fields::Fields;
 use super::scenes::{Names, unknown_name};
 use super::selections;
@@ -10,6 +11,7 @@ use super::source::{Mistakes, Place};
 use super::tree::Node;
 use crate::claim::{Selection, Selector};
 use crate::error::{Error, did_you_mean};
+use crate::math::Camera;
 use crate::record::{PathSpec, SceneSpec};
 use crate::registry::Spec;
 
@@ -72,7 +74,7 @@ impl Matrix {
     }
 }
 
-pub fn matrix(top: &mut Fields, names: &Names) -> Option<Matrix> {
+pub fn matrix(top: &mut Fields, names: &Names, section: &Camera) -> Option<Matrix> {
     let Some(mut f) = top.table("matrix") else {
         if !top.has("matrix") {
             top.missing("matrix", "add [matrix] with structure = [\"list\", \"octree\"] and culling = [\"frustum\"]");
@@ -96,7 +98,7 @@ pub fn matrix(top: &mut Fields, names: &Names) -> Option<Matrix> {
     }
     let mut axes = Vec::new();
     for axis in AXES {
-        axes.push(axis_values(&mut f, axis).unwrap_or_else(|| default_values(axis)));
+        axes.push(axis_values(&mut f, axis, section).unwrap_or_else(|| default_values(axis, section)));
     }
     let zip = zips(&mut f, &axes, scene_axis.len());
     let place = f.place.clone();
@@ -108,14 +110,14 @@ fn empty_axis(name: &str) -> Error {
     Error::new("is an empty list, so nothing would run").help(format!("give at least one {name}, or remove the key"))
 }
 
-fn axis_values(f: &mut Fields, axis: &'static Axis) -> Option<AxisValues> {
+fn axis_values(f: &mut Fields, axis: &'static Axis, section: &Camera) -> Option<AxisValues> {
     let nodes = f.one_or_more(axis.name)?;
     let key = f.key(axis.name);
     if nodes.is_empty() {
         let place = f.get(axis.name).map_or(f.place.clone(), |n| n.place.clone());
         f.note(&place, axis.name, empty_axis(axis.name));
     }
-    Some(read_values(f.mistakes, &key, axis, nodes))
+    Some(read_values(f.mistakes, &key, axis, nodes, section))
 }
 
 /// Numbers of the scenes or paths that `nodes` name, `*` allowed; each once.
@@ -195,14 +197,14 @@ fn zips(f: &mut Fields, axes: &[AxisValues], scenes: usize) -> Vec<Zip> {
     out
 }
 
-pub fn includes(top: &mut Fields, names: &Names) -> Vec<Include> {
+pub fn includes(top: &mut Fields, names: &Names, section: &Camera) -> Vec<Include> {
     let mut out = Vec::new();
     for mut f in top.tables("include") {
         let scenes = f.one_or_more("scene").map(|nodes| named(&f, "scene", nodes, &names.scenes));
         let paths = f
             .one_or_more("path")
             .map(|nodes| named(&f, "path", nodes, &names.paths).into_iter().map(|i| names.paths[i].clone()).collect());
-        let axes: Vec<Option<AxisValues>> = AXES.iter().map(|axis| axis_values(&mut f, axis)).collect();
+        let axes: Vec<Option<AxisValues>> = AXES.iter().map(|axis| axis_values(&mut f, axis, section)).collect();
         let (key, place) = (f.path.clone(), f.place.clone());
         if f.entries().is_empty() {
             let e = Error::new("fixes no axis, so it adds nothing");

@@ -1,10 +1,13 @@
 //! `[[scene]]` and `[[path]]`: sources checked and fingerprinted.
 
-use super::axes::{self, Part, expand_part};
+use super::axes::Part;
+use super::entries::{self, expand_part};
+use super::families::{self, MAX_MEMBERS, SCALE, Word};
 use super::fields::Fields;
 use super::lab;
 use super::source::Place;
 use super::tree::{Data, Node, get};
+use crate::claim::{FAMILY, Selector};
 use crate::error::{Error, Result, did_you_mean};
 use crate::record::{PathSource, PathSpec, SceneSource, SceneSpec, Up, Winding};
 use crate::registry::Spec;
@@ -45,23 +48,19 @@ pub fn read(top: &mut Fields) -> Scenes {
     }
     for mut f in tables {
         let name = f.name("name", "name the scene, such as name = \"hall\"");
-        if let Some(name) = &name {
-            unique(&mut f, "scene", name, &names.scenes);
-            names.scenes.push(name.clone());
-        }
+        unique(&mut f, "scene", name.as_deref(), &names.scenes);
         let place = f.place.clone();
-        if let Some(scene) = scene(f, name) {
-            scenes.push((scene, place));
-        }
+        let members = scene(f, name.as_deref());
+        // A scene with mistakes keeps its name, so that rules about it are not mistakes too.
+        names.scenes.extend(if members.is_empty() { Vec::from_iter(name) } else { member_names(&members) });
+        scenes.extend(members.into_iter().map(|s| (s, place.clone())));
     }
     let mut paths: Vec<Vec<PathSpec>> = vec![Vec::new(); scenes.len()];
     for mut f in top.tables("path") {
         let name = f.name("name", "name the path, such as name = \"walk\"");
-        if let Some(name) = &name {
-            unique(&mut f, "path", name, &names.paths);
-            names.paths.push(name.clone());
-        }
-        path(f, name, &scenes, &names, &mut paths);
+        unique(&mut f, "path", name.as_deref(), &names.paths);
+        let members = path(f, name.as_deref(), &scenes, &names, &mut paths);
+        names.paths.extend(if members.is_empty() { Vec::from_iter(name) } else { members });
     }
     for ((scene, place), paths) in scenes.iter().zip(&paths) {
         if paths.is_empty() && top.mistakes.is_empty() {
@@ -72,8 +71,17 @@ pub fn read(top: &mut Fields) -> Scenes {
     Scenes { scenes: scenes.into_iter().map(|(s, _)| s).collect(), paths, names }
 }
 
-fn unique(f: &mut Fields, what: &str, name: &str, before: &[String]) {
-    if before.iter().any(|n| n == name)
+fn member_names(members: &[SceneSpec]) -> Vec<String> {
+    members.iter().map(|s| s.name.clone()).collect()
+}
+
+/// `hall` of `hall@offset_m=1e4`.
+fn family(name: &str) -> &str {
+    name.split(FAMILY).next().unwrap_or(name)
+}
+
+fn unique(f: &mut Fields, what: &str, name: Option<&str>, before: &[String]) {
+    if let Some(name) = name.filter(|name| before.iter().any(|n| family(n) == *name))
         && let Some(node) = f.get("name")
     {
         let e = Error::new(format!("`{name}` names two {what}s"));
@@ -81,52 +89,86 @@ fn unique(f: &mut Fields, what: &str, name: &str, before: &[String]) {
     }
 }
 
-fn scene(mut f: Fields, name: Option<String>) -> Option<SceneSpec> {
+/// Every scene that an entry means; none if it has mistakes.
+fn scene(mut f: Fields, name: Option<&str>) -> Vec<SceneSpec> {
     let source = source(&mut f, "scene generator", &lab::generators(), lab::check_generator, &["obj", "gltf", "glb"]);
     let windings = [("ccw", Winding::Ccw), ("cw", Winding::Cw), ("two_sided", Winding::TwoSided)];
     let winding = f.choice("winding", &windings).unwrap_or_default();
-    let generated = matches!(source, Some((Source::Generated(_), _)));
+    let generated = matches!(&source, Some((Source::Generated(_), _)));
     let up = f.choice("up", &[("y", Up::Y), ("z", Up::Z)]).unwrap_or(if generated { Up::Z } else { Up::Y });
-    let scale = f.number("scale", "metres a unit, above 0", |x| x > 0.0 && x.is_finite()).unwrap_or(1.0);
+    let mut scales = families::numbers(&mut f, &SCALE, "metres a unit, above 0", |x| x > 0.0 && x.is_finite());
+    if scales.is_empty() {
+        scales.push((Word::Number(1.0), 1.0));
+    }
+    let mut offsets = families::offsets(&mut f);
+    if offsets.is_empty() {
+        offsets.push((Word::Number(0.0), [0.0; 3]));
+    }
     let weld = f.bool("weld").unwrap_or(false);
-    let place = f.place.clone();
-    let mistakes = f.mistakes;
-    let key = f.path.clone();
+    let (place, mistakes, key) = (f.place.clone(), f.mistakes, f.path.clone());
     f.finish();
-    let (source, source_place) = source?;
-    let source = match source {
-        Source::File(path) => SceneSource::File(path),
-        Source::Generated(spec) => SceneSource::Generated(spec),
+    let (Some((source, source_place)), Some(name)) = (source, name) else { return Vec::new() };
+    let sources = match source {
+        Source::File(path) => vec![(String::new(), SceneSource::File(path))],
+        Source::Generated(specs) => named(specs, SceneSource::Generated),
     };
-    match lab::scene_fingerprint(&source, winding, up, scale, weld) {
-        Ok(fingerprint) => Some(SceneSpec { name: name?, source, winding, up, scale, weld, fingerprint }),
-        Err(e) => {
-            mistakes.note(if source_place.span.is_empty() { &place } else { &source_place }, &key, plain(e));
-            None
+    let count = sources.len() * scales.len() * offsets.len();
+    if count > MAX_MEMBERS {
+        mistakes.note(&place, &key, too_many(count, "scenes"));
+        return Vec::new();
+    }
+    let mut out = Vec::new();
+    for (of_source, source) in &sources {
+        for (of_scale, (_, scale)) in families::suffixes("scale", &scales).iter().zip(&scales) {
+            let fingerprint = match lab::scene_fingerprint(source, winding, up, *scale, weld) {
+                Ok(fingerprint) => fingerprint,
+                Err(e) => {
+                    mistakes.note(if source_place.span.is_empty() { &place } else { &source_place }, &key, plain(e));
+                    return Vec::new();
+                }
+            };
+            for (of_offset, (_, offset_m)) in families::suffixes("offset_m", &offsets).iter().zip(&offsets) {
+                let name = format!("{name}{of_source}{of_scale}{of_offset}");
+                let (source, fingerprint) = (source.clone(), fingerprint.clone());
+                let still =
+                    SceneSpec { name, source, winding, up, scale: *scale, weld, offset_m: [0.0; 3], fingerprint };
+                out.push(lab::moved(still, *offset_m));
+            }
         }
     }
+    out
 }
 
+fn named<T>(specs: Vec<Spec>, make: fn(Spec) -> T) -> Vec<(String, T)> {
+    families::spec_suffixes(&specs).into_iter().zip(specs.into_iter().map(make)).collect()
+}
+
+fn too_many(count: usize, what: &str) -> Error {
+    Error::new(format!("means {count} {what}, more than {MAX_MEMBERS}")).help("shorten its lists and ranges")
+}
+
+/// Adds the paths of an entry to the scenes that they apply to; returns their names.
 fn path(
     mut f: Fields,
-    name: Option<String>,
+    name: Option<&str>,
     scenes: &[(SceneSpec, Place)],
     names: &Names,
     paths: &mut [Vec<PathSpec>],
-) -> Option<()> {
+) -> Vec<String> {
     let source = source(&mut f, "path generator", &lab::walkers(), lab::check_walker, &["csv"]);
     let frames = f.u32("frames", 1..=10_000_000);
     let stride = f.u32("stride", 1..=1_000_000).unwrap_or(1);
-    let mut applies: Vec<&str> = Vec::new();
+    let mut applies: Vec<Selector> = Vec::new();
     let nodes = f.one_or_more("scene");
     for node in nodes.unwrap_or_default() {
-        match node.text() {
-            Some(scene) if names.scenes.iter().any(|n| n == scene) => applies.push(scene),
-            Some(scene) => f.note(&node.place, "scene", unknown_name("scene", scene, &names.scenes)),
-            None => {
-                let e = Error::new(format!("must be the name of a scene, not {}", node.noun()));
-                f.note(&node.place, "scene", e.help("write scene = \"hall\" or scene = [\"hall\", \"yard\"]"));
-            }
+        let Some(text) = node.text() else {
+            let e = Error::new(format!("must be the name of a scene, not {}", node.noun()));
+            f.note(&node.place, "scene", e.help("write scene = \"hall\" or scene = [\"hall\", \"yard\"]"));
+            continue;
+        };
+        match Selector::parse(text).ok().filter(|s| names.scenes.iter().any(|n| s.matches(&[Spec::new(n)]))) {
+            Some(selector) => applies.push(selector),
+            None => f.note(&node.place, "scene", unknown_name("scene", text, &names.scenes)),
         }
     }
     if nodes.is_some_and(<[Node]>::is_empty) {
@@ -134,35 +176,46 @@ fn path(
         f.note(&place, "scene", Error::new("is an empty list").help("remove the key to walk through every scene"));
     }
     let everywhere = nodes.is_none();
-    let mistakes = f.mistakes;
-    let key = f.path.clone();
+    let (whole, mistakes, key) = (f.place.clone(), f.mistakes, f.path.clone());
     f.finish();
-    let (source, place) = source?;
-    let source = match source {
-        Source::File(path) => PathSource::File(path),
-        Source::Generated(spec) => PathSource::Generated(spec),
+    let (Some((source, place)), Some(name)) = (source, name) else { return Vec::new() };
+    let sources = match source {
+        Source::File(path) => vec![(String::new(), PathSource::File(path))],
+        Source::Generated(specs) => named(specs, PathSource::Generated),
     };
-    let name = name?;
-    for ((scene, _), list) in scenes.iter().zip(paths) {
-        if !everywhere && !applies.contains(&scene.name.as_str()) {
-            continue;
-        }
-        match lab::path_fingerprint(&source, &scene.fingerprint) {
-            Ok(fingerprint) => {
-                list.push(PathSpec { name: name.clone(), source: source.clone(), frames, stride, fingerprint });
-            }
-            Err(e) => mistakes.note(&place, &key, plain(e)),
-        }
+    if sources.len() > MAX_MEMBERS {
+        mistakes.note(&whole, &key, too_many(sources.len(), "paths"));
+        return Vec::new();
     }
-    Some(())
+    let mut out = Vec::new();
+    for (suffix, source) in &sources {
+        let name = format!("{name}{suffix}");
+        for ((scene, _), list) in scenes.iter().zip(paths.iter_mut()) {
+            if !everywhere && !applies.iter().any(|s| s.matches(&[Spec::new(&scene.name)])) {
+                continue;
+            }
+            match lab::path_fingerprint(source, &scene.fingerprint) {
+                Ok(fingerprint) => {
+                    list.push(PathSpec { name: name.clone(), source: source.clone(), frames, stride, fingerprint });
+                }
+                Err(e) => mistakes.note(&place, &key, plain(e)),
+            }
+        }
+        out.push(name);
+    }
+    out
 }
 
+/// Members of a family are suggested by its name.
 pub fn unknown_name(what: &str, name: &str, known: &[String]) -> Error {
     let mut e = Error::new(format!("there is no {what} `{name}`"));
-    e.help = Some(match did_you_mean(name, known.iter().map(String::as_str)) {
+    let mut families: Vec<&str> = known.iter().map(|n| family(n)).collect();
+    families.dedup();
+    let all = known.iter().map(String::as_str).filter(|_| name.contains(FAMILY)).chain(families.iter().copied());
+    e.help = Some(match did_you_mean(name, all.collect::<Vec<_>>().into_iter()) {
         Some(near) => format!("did you mean `{near}`?"),
         None if known.is_empty() => format!("the manifest names no {what}"),
-        None => format!("{what}s: {}", known.join(", ")),
+        None => format!("{what}s: {}", families.join(", ")),
     });
     e
 }
@@ -180,7 +233,8 @@ fn plain(mut e: Error) -> Error {
 
 enum Source {
     File(PathBuf),
-    Generated(Spec),
+    /// One spec, or those of a family.
+    Generated(Vec<Spec>),
 }
 
 /// `file = "..."` or `generate = ...`, exactly one of them.
@@ -222,15 +276,15 @@ fn source(
         (None, Some(node)) => {
             let key = f.key("generate");
             let specs = match &node.data {
-                Data::Text(text) => match axes::read_single(check, parts, text) {
+                Data::Text(text) => match entries::read_single(check, parts, text) {
                     Ok(spec) => vec![spec],
                     Err((word, e)) => {
-                        f.mistakes.note(&axes::within(f.mistakes, node, word.as_deref()), &key, e);
+                        f.mistakes.note(&entries::within(f.mistakes, node, word.as_deref()), &key, e);
                         Vec::new()
                     }
                 },
                 Data::Table(table) if get(table, "kind").is_some() => {
-                    let (kind, part) = axes::read_kind(f.mistakes, &key, what, parts, node)?;
+                    let (kind, part) = entries::read_kind(f.mistakes, &key, what, parts, node)?;
                     expand_part(f.mistakes, &key, node, &kind, part.params, check)
                 }
                 _ => {
@@ -240,12 +294,7 @@ fn source(
                     Vec::new()
                 }
             };
-            if specs.len() > 1 {
-                let e = Error::new(format!("means {} scenes or paths at once", specs.len()));
-                f.note(&node.place, "generate", e.help("give single values, and an entry for each"));
-                return None;
-            }
-            specs.into_iter().next().map(|spec| (Source::Generated(spec), node.place.clone()))
+            (!specs.is_empty()).then(|| (Source::Generated(families::tidied(specs)), node.place.clone()))
         }
     }
 }

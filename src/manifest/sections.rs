@@ -5,6 +5,7 @@ use super::tree::Data;
 use super::{Study, Timing};
 use crate::error::Error;
 use crate::math::{Camera, Projection};
+use crate::record::cameras::FOV_Y_DEG;
 use crate::record::{Accuracy, RepeatPolicy, TimeModel};
 use std::path::Path;
 
@@ -35,15 +36,12 @@ enum Kind {
     Orthographic,
 }
 
-/// Widest and narrowest field of view: beyond them the view volume degenerates.
-const FOV_DEG: std::ops::RangeInclusive<f64> = 0.1..=175.0;
-
 pub fn camera(top: &mut Fields) -> Option<Camera> {
     let mut camera = Camera::default();
     let Some(mut f) = top.table("camera") else { return (!top.has("camera")).then_some(camera) };
     let kinds = [("perspective", Kind::Perspective), ("orthographic", Kind::Orthographic)];
     let kind = f.choice("projection", &kinds).unwrap_or(Kind::Perspective);
-    let fov = f.number("fov_y_deg", "degrees from 0.1 to 175", |x| FOV_DEG.contains(&x));
+    let fov = f.number("fov_y_deg", "degrees from 0.01 to 179", |x| FOV_Y_DEG.contains(&x));
     let height = f.number("height_m", "metres above 0", positive);
     let misplaced = match kind {
         Kind::Perspective => ("height_m", "orthographic", "fov_y_deg"),

@@ -3,10 +3,9 @@
 
 use crate::claim::{Selection, Selector};
 use crate::error::Error;
-use crate::manifest::axes::{AXES, AxisValue, takes_arithmetic};
+use crate::manifest::axes::{AXES, AxisValue};
 use crate::manifest::source::Mistakes;
 use crate::manifest::{Include, Manifest};
-use crate::math::{Arithmetic, arithmetic};
 use crate::registry::{Spec, Value};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -25,7 +24,12 @@ pub struct Pool {
     values: Vec<(usize, AxisValue, Vec<u32>)>,
     numbers: HashMap<(usize, String), u32>,
     autos: HashMap<(u32, u32), u32>,
+    /// What an axis (by position) is beside a culling, where that leaves no choice.
+    settled: HashMap<(u32, usize), Option<u32>>,
 }
+
+/// Position of the axis `culling`.
+const CULLING: usize = 1;
 
 impl Pool {
     fn number(&mut self, axis: usize, value: &AxisValue) -> u32 {
@@ -49,7 +53,8 @@ impl Pool {
         &self.values[number as usize].2
     }
 
-    /// `auto` made concrete beside the cell's structure.
+    /// `auto` made concrete beside the cell's structure; an axis that the cell's
+    /// culling does not take gets its usual value.
     fn settle(&mut self, cell: &mut Cell) {
         for (i, axis) in AXES.iter().enumerate() {
             let Some(auto) = axis.auto else { continue };
@@ -68,11 +73,16 @@ impl Pool {
                 }
             };
         }
-        // Where no test asks for an arithmetic, all of them are one cell.
-        let position = |name: &str| AXES.iter().position(|a| a.name == name).expect("a known axis");
-        let (culling, arithmetic) = (position("culling"), position(arithmetic::NAME));
-        if !takes_arithmetic(self.value(cell.values[culling])) {
-            cell.values[arithmetic] = self.number(arithmetic, &vec![Spec::new(Arithmetic::default().name())]);
+        let culling = cell.values[CULLING];
+        for (i, axis) in AXES.iter().enumerate() {
+            let Some(settled) = axis.settled else { continue };
+            let known = self.settled.get(&(culling, i)).copied();
+            let only = known.unwrap_or_else(|| {
+                let only = settled(self.value(culling)).map(|spec| self.number(i, &vec![spec]));
+                self.settled.insert((culling, i), only);
+                only
+            });
+            cell.values[i] = only.unwrap_or(cell.values[i]);
         }
     }
 

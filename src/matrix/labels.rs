@@ -14,17 +14,18 @@ pub struct Labels {
     pub walk: String,
     /// The walk is not the structure's own.
     pub walk_is_special: bool,
-    pub arithmetic: String,
-    /// The arithmetic is not the default.
-    pub arithmetic_is_special: bool,
+    /// Values of further axes by name, the usual ones too.
+    further: Vec<(&'static str, String)>,
+    /// Those that are not usual: `f64`.
+    special: Vec<String>,
 }
 
 impl Labels {
-    /// `octree × frustum`, walk and arithmetic only where they are not the usual ones.
+    /// `octree × frustum`, the walk and further axes only where they are not the usual ones.
     pub fn cell(&self) -> String {
         let walk = if self.walk_is_special { format!(" × {}", self.walk) } else { String::new() };
-        let arithmetic = if self.arithmetic_is_special { format!(" × {}", self.arithmetic) } else { String::new() };
-        format!("{} × {}{walk}{arithmetic}", self.structure, self.culling)
+        let special: String = self.special.iter().map(|s| format!(" × {s}")).collect();
+        format!("{} × {}{walk}{special}", self.structure, self.culling)
     }
 
     /// By axis name; an unknown axis has no label.
@@ -35,8 +36,9 @@ impl Labels {
             "structure" => &self.structure,
             "culling" => &self.culling,
             "walk" => &self.walk,
-            "arithmetic" => &self.arithmetic,
-            _ => return String::new(),
+            _ => {
+                return self.further.iter().find(|(name, _)| *name == axis).map(|(_, l)| l.clone()).unwrap_or_default();
+            }
         }
         .clone()
     }
@@ -52,8 +54,8 @@ pub fn labels(run: &RunSpec) -> Labels {
         culling: label("culling", &run.culling),
         walk,
         walk_is_special: usual.as_ref() != Some(&run.walk),
-        arithmetic: label("arithmetic", &axis_value(run, "arithmetic")),
-        arithmetic_is_special: run.axes.contains_key("arithmetic"),
+        further: AXES[3..].iter().map(|a| (a.name, label(a.name, &axis_value(run, a.name)))).collect(),
+        special: run.further(),
     }
 }
 

@@ -4,13 +4,16 @@
 mod cells;
 mod labels;
 pub mod plan;
+mod sweeps;
 
 use crate::claim::selects;
 use crate::error::Error;
 use crate::manifest::Manifest;
-use crate::manifest::axes::{AXES, is_silent};
+use crate::manifest::axes::AXES;
 use crate::manifest::source::Mistakes;
-use crate::record::{Protocol, RunSpec};
+use crate::math::{Arithmetic, arithmetic};
+use crate::record::{Protocol, RunSpec, cameras};
+use crate::registry::Spec;
 use crate::results::Excluded;
 use cells::{Block, Cell, Compiled, Pool};
 pub use labels::{Labels, labels};
@@ -125,6 +128,7 @@ pub fn expand(manifest: &Manifest, setting: &Setting) -> Result<Matrix, Vec<Erro
     let runs: Vec<RunSpec> = kept.iter().map(|c| build(manifest, setting, &pool, c)).collect();
     if mistakes.is_empty() {
         check_claims(manifest, &runs, &mistakes);
+        sweeps::check(manifest, &runs, &mistakes);
     }
     let (_, errors) = mistakes.into_errors();
     if !errors.is_empty() {
@@ -152,27 +156,34 @@ fn empty(manifest: &Manifest, excluded: usize) -> Error {
 fn build(manifest: &Manifest, setting: &Setting, pool: &Pool, cell: &Cell) -> RunSpec {
     let mut revisions = BTreeMap::new();
     let mut others = BTreeMap::new();
-    let mut named: BTreeMap<&str, &Vec<crate::registry::Spec>> = BTreeMap::new();
+    let mut named: BTreeMap<&str, &Vec<Spec>> = BTreeMap::new();
     for (axis, id) in AXES.iter().zip(&cell.values) {
         let value = pool.value(*id);
         named.insert(axis.name, value);
-        if is_silent(axis, value) {
+        let known = matches!(axis.name, "structure" | "culling" | "walk");
+        if !known && is_usual(manifest, axis.name, value) {
             continue;
         }
-        for (spec, revision) in value.iter().zip(pool.revisions(*id)) {
-            revisions.insert(format!("{}.{}", axis.name, spec.kind), *revision);
-        }
-        if !matches!(axis.name, "structure" | "culling" | "walk")
-            && let Some(spec) = value.first()
-        {
+        if !known && let Some(spec) = value.first() {
             others.insert(axis.name.to_string(), spec.clone());
         }
+        // A camera is part of the answer by its numbers.
+        for (spec, revision) in value.iter().zip(pool.revisions(*id)).filter(|_| axis.name != cameras::AXIS) {
+            revisions.insert(format!("{}.{}", axis.name, spec.kind), *revision);
+        }
     }
+    for arithmetic in named["culling"].iter().filter_map(stated_arithmetic) {
+        revisions.insert(format!("{}.{arithmetic}", arithmetic::NAME), arithmetic.revision());
+    }
+    let camera = match others.get(cameras::AXIS) {
+        Some(spec) => cameras::camera_of(spec).expect("the manifest checked its cameras"),
+        None => manifest.camera,
+    };
     let one = |name: &str| named[name].first().cloned().expect("a plain axis has one part");
     RunSpec {
         scene: manifest.scenes[cell.scene].clone(),
         path: manifest.paths[cell.scene][cell.path].clone(),
-        camera: manifest.camera,
+        camera,
         structure: one("structure"),
         culling: named["culling"].clone(),
         walk: one("walk"),
@@ -190,6 +201,21 @@ fn build(manifest: &Manifest, setting: &Setting, pool: &Pool, cell: &Cell) -> Ru
         series: setting.series,
         model: manifest.model,
     }
+}
+
+/// Whether an axis has its usual value, which is not stored: runs keep the ids that
+/// they had before the axis came.
+fn is_usual(manifest: &Manifest, axis: &str, value: &[Spec]) -> bool {
+    match (axis, value) {
+        (arithmetic::NAME, [spec]) => spec.kind == Arithmetic::default().name(),
+        (cameras::AXIS, [spec]) => *spec == cameras::spec_of(&manifest.camera),
+        _ => false,
+    }
+}
+
+/// The arithmetic that a part states itself.
+fn stated_arithmetic(part: &Spec) -> Option<Arithmetic> {
+    part.params.get(arithmetic::NAME).and_then(|value| Arithmetic::named(&value.to_string()))
 }
 
 /// Excluded cells without their scene, in order, with how many runs each saves.

@@ -6,6 +6,7 @@ use crate::manifest::Manifest;
 use crate::record::{PathSource, RunSpec};
 use crate::registry::Value;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// What a store knows of a run.
@@ -74,6 +75,9 @@ pub struct Row {
     pub structure: String,
     pub culling: String,
     pub walk: String,
+    /// Values of further axes that are not the usual ones.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub axes: BTreeMap<String, String>,
     #[serde(skip)]
     cell: String,
     #[serde(flatten)]
@@ -144,6 +148,7 @@ fn row(run: &RunSpec, known: Known, excluded: Option<String>, estimate_s: f64) -
         structure: l.structure,
         culling: l.culling,
         walk: l.walk,
+        axes: run.axes.iter().map(|(axis, spec)| (axis.clone(), spec.to_string())).collect(),
         cell,
         known,
         excluded,
@@ -256,7 +261,7 @@ impl Plan {
         }
         let _ = writeln!(out, "; {} excluded (-)", self.excluded.len());
         if self.duplicates > 0 {
-            let _ = writeln!(out, "{} cells or values were written twice and run once", self.duplicates);
+            let _ = writeln!(out, "{} cells or values are equal to others and run once", self.duplicates);
         }
         for (n, reason) in reasons(self.rows.iter().filter_map(|r| match &r.known.state {
             State::Rerun { why } => Some(why.as_str()),

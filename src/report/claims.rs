@@ -3,6 +3,7 @@
 use super::metrics::{self, Kind, Metric};
 use super::{labels, own_value};
 use crate::claim::{Claim, Relation, axis_value, selects};
+use crate::culling;
 use crate::registry::format_sum;
 use crate::results::{RunResult, RunStatus, StudyResults};
 use crate::stats;
@@ -113,29 +114,48 @@ fn groups<'a>(results: &'a StudyResults, claim: &Claim) -> Vec<Pairs<'a>> {
         let structure = format_sum(std::slice::from_ref(&run.spec.structure));
         walks.entry(structure).or_default().insert(run.spec.walk.to_string());
     }
-    let free = |run: &RunResult| -> String {
-        let mut axes = vec!["scene", "path", "structure", "culling", "walk"];
-        axes.extend(run.spec.axes.keys().map(String::as_str));
-        axes.retain(|a| !claim.numerator.contains_key(*a) && !claim.denominator.contains_key(*a));
+    let fixed = |axis: &str| !claim.numerator.contains_key(axis) && !claim.denominator.contains_key(axis);
+    let free = |run: &RunResult, arithmetic: &str| -> String {
+        let mut axes = vec!["scene", "path", "structure", "culling", "walk", "arithmetic"];
+        axes.extend(run.spec.axes.keys().map(String::as_str).filter(|a| !matches!(*a, "arithmetic" | "camera")));
+        axes.retain(|a| fixed(a));
         let value = |axis: &str| match axis {
             // A structure's only walk is its own: a list is scanned, a tree descended,
             // and a claim about structures compares the two.
             "walk" if walks[&format_sum(std::slice::from_ref(&run.spec.structure))].len() == 1 => "its own".to_string(),
+            "arithmetic" => arithmetic.to_string(),
             _ => format_sum(&axis_value(&run.spec, axis)),
         };
         let values = axes.iter().map(|a| format!("{a}={}", value(a)));
-        // Times of different machines or series are never mixed; nor are scenes of two cameras.
-        let key = format!("{} {} {:?}", run.machine_class, run.spec.series, run.spec.camera);
+        // Times of different machines or series are never mixed; nor, unless a claim
+        // asks for it, are scenes of two cameras.
+        let camera = if fixed("camera") { format!("{:?}", run.spec.camera) } else { String::new() };
+        let key = format!("{} {} {camera}", run.machine_class, run.spec.series);
         values.chain([key]).collect::<Vec<_>>().join(";")
+    };
+    // What takes no arithmetic ran once, and stands beside the others in each of them.
+    let arithmetic = |run: &RunResult| format_sum(&axis_value(&run.spec, "arithmetic"));
+    let all: BTreeSet<String> = results.runs.iter().map(arithmetic).collect();
+    let keys = |run: &RunResult| -> BTreeSet<String> {
+        let takes = run.spec.culling.iter().any(|part| culling::knows_arithmetic(&part.kind));
+        if takes { BTreeSet::from([free(run, &arithmetic(run))]) } else { all.iter().map(|a| free(run, a)).collect() }
     };
     let mut partners: BTreeMap<String, Vec<&RunResult>> = BTreeMap::new();
     for b in results.runs.iter().filter(|b| selects(&claim.denominator, &b.spec)) {
-        partners.entry(free(b)).or_default().push(b);
+        for key in keys(b) {
+            partners.entry(key).or_default().push(b);
+        }
     }
     let mut groups: Vec<Pairs> = Vec::new();
     for a in results.runs.iter().filter(|r| selects(&claim.numerator, &r.spec)) {
         let name = group_name(results, claim, a);
-        for b in partners.get(&free(a)).into_iter().flatten().copied() {
+        let mut beside: Vec<&RunResult> = Vec::new();
+        for b in keys(a).iter().flat_map(|key| partners.get(key).into_iter().flatten()) {
+            if !beside.iter().any(|other| std::ptr::eq(*other, *b)) {
+                beside.push(b);
+            }
+        }
+        for b in beside {
             let group = match groups.iter_mut().position(|g| g.name == name) {
                 Some(i) => &mut groups[i],
                 None => {

@@ -8,6 +8,7 @@
 use super::metrics::{self, Kind, Metric};
 use super::table::{Cell, Column, Table, column, interval, number, status_word};
 use crate::error::{Error, Result};
+use crate::record::cameras;
 use crate::registry::format_sum;
 use crate::results::{RunResult, RunStatus, StudyResults};
 use crate::stats;
@@ -67,8 +68,9 @@ pub fn compare<'a>(first: &'a StudyResults, second: &'a StudyResults, metric: &s
     let rest = second.runs.iter().zip(&taken).filter(|(_, t)| !**t);
     pairs.extend(rest.map(|(b, _)| pair(None, Some(b), metric)));
     if !pairs.iter().any(|p| p.first.is_some() && p.second.is_some()) {
-        return Err(Error::new(format!("`{}` and `{}` have no cell in common", first.name, second.name))
-            .help("cells match by scene, path, camera, structure, culling and walk with all their parameters"));
+        return Err(Error::new(format!("`{}` and `{}` have no cell in common", first.name, second.name)).help(
+            "cells match by scene, path, camera, structure, culling, walk and arithmetic with all their parameters",
+        ));
     }
     let size = |p: &Pair| p.ratio.map_or(-1.0, |(r, ..)| r.ln().abs());
     let rank = |p: &Pair| match p.change {
@@ -84,7 +86,9 @@ pub fn compare<'a>(first: &'a StudyResults, second: &'a StudyResults, metric: &s
 /// compared with one on a changed scene or algorithm, and a note says so.
 fn cell(run: &RunResult) -> String {
     let s = &run.spec;
-    let axes: Vec<String> = s.axes.iter().map(|(k, v)| format!("{k}={v}")).collect();
+    // The camera stands there by its numbers, however its manifest named it.
+    let axes: Vec<String> =
+        s.axes.iter().filter(|(k, _)| *k != cameras::AXIS).map(|(k, v)| format!("{k}={v}")).collect();
     format!(
         "{}|{}|{:?}|{}|{}|{}|{}",
         s.scene.name,

@@ -7,6 +7,7 @@ use super::table::{Cell, Column, Table, column, interval, number, status_word};
 use super::tables::class_word;
 use crate::claim::{Selector, axis_value};
 use crate::error::{Error, Result, did_you_mean};
+use crate::record::cameras;
 use crate::registry::{Spec, Value, format_sum};
 use crate::results::{RunResult, StudyResults};
 use std::collections::BTreeSet;
@@ -17,6 +18,8 @@ pub enum Field {
     Axis(String),
     /// A parameter, of one kind of part or of any.
     Param(Option<String>, String),
+    /// A number by axis and parameter: `scene.offset_m`, `camera.fov_y_deg`.
+    Number(String),
     Metric(&'static str),
     About(&'static str),
 }
@@ -24,24 +27,26 @@ pub enum Field {
 /// What describes a run beside axes and metrics.
 const ABOUT: &[&str] =
     &["answer_id", "class", "combination", "machine_class", "measurement_id", "reason", "series", "status"];
-const AXES: &[&str] = &["scene", "path", "structure", "culling", "walk"];
+const AXES: &[&str] = &["scene", "path", "structure", "culling", "walk", "arithmetic", "camera"];
 
 /// All fields of a study.
 #[derive(Debug, Clone, Default)]
 pub struct Fields {
     axes: Vec<String>,
     params: BTreeSet<(String, String)>,
+    numbers: BTreeSet<String>,
 }
 
 impl Fields {
     pub fn of(results: &StudyResults) -> Fields {
-        let mut fields = Fields { axes: AXES.iter().map(|a| a.to_string()).collect(), params: BTreeSet::new() };
+        let mut fields = Fields { axes: AXES.iter().map(|a| a.to_string()).collect(), ..Fields::default() };
         for run in &results.runs {
             for axis in run.spec.axes.keys() {
                 if !fields.axes.contains(axis) {
                     fields.axes.push(axis.clone());
                 }
             }
+            fields.numbers.extend(run.spec.numbers().into_keys());
             for part in parts(run) {
                 fields.params.extend(part.params.keys().map(|p| (part.kind.clone(), p.clone())));
             }
@@ -62,6 +67,7 @@ impl Fields {
             return Some(if shadowed { Field::Param(None, name.into()) } else { Field::Metric(metric.name) });
         }
         match name.split_once('.') {
+            Some(_) if self.numbers.contains(name) => Some(Field::Number(name.into())),
             Some((kind, param)) => self
                 .params
                 .contains(&(kind.to_string(), param.to_string()))
@@ -85,6 +91,7 @@ impl Fields {
         let mut names: BTreeSet<String> = self.axes.iter().cloned().collect();
         names.extend(ABOUT.iter().map(|a| a.to_string()));
         names.extend(metrics::METRICS.iter().map(|m| m.name.to_string()));
+        names.extend(self.numbers.iter().cloned());
         names.extend(self.params.iter().flat_map(|(kind, p)| [p.clone(), format!("{kind}.{p}")]));
         names.into_iter().collect()
     }
@@ -117,6 +124,13 @@ impl Fields {
                     .help(format!("compare `{name}` with a number, or use ="))),
                 None => Ok(()),
             },
+            Field::Number(name) => {
+                match text {
+                    Some(v) => Err(Error::new(format!("`{name}` is a number, and `{v}` is none"))
+                        .help(format!("write {name} >= 10"))),
+                    None => Ok(()),
+                }
+            }
             Field::About(_) | Field::Param(..) => Ok(()),
         }
     }
@@ -135,6 +149,7 @@ impl Fields {
                 let each = |v: &Value| holds(op, v, values);
                 if negative { !found.is_empty() && found.iter().all(each) } else { found.iter().any(each) }
             }
+            Field::Number(name) => run.spec.number(name).is_some_and(|x| holds(op, &Value::Float(x), values)),
             Field::Metric(name) => metric(name).value(run).is_some_and(|x| holds(op, &Value::Float(x), values)),
             Field::About(name) => {
                 let found = about(run, name).map(|t| if *name == "series" { Value::parse(&t) } else { Value::Text(t) });
@@ -150,7 +165,7 @@ impl Fields {
                 let c = column(m.name, m.unit, m.about);
                 if has_interval(m) { c.with_interval() } else { c }
             }
-            Field::Param(..) => column(name, "", "parameter"),
+            Field::Param(..) | Field::Number(_) => column(name, "", "parameter"),
             _ => Column::text(name),
         }
     }
@@ -162,6 +177,7 @@ impl Fields {
                 "structure" => text(run.structure.clone()),
                 "culling" => text(run.culling.clone()),
                 "walk" => text(run.walk.clone()),
+                "camera" => text(cameras::label(&cameras::spec_of(&run.spec.camera))),
                 _ => text(format_sum(&axis_value(&run.spec, name))),
             },
             Field::Param(kind, name) => match params(run, kind.as_deref(), name).first() {
@@ -170,6 +186,7 @@ impl Fields {
                 Some(Value::Float(x)) => Cell::Number(*x),
                 Some(other) => Cell::Text(other.to_string()),
             },
+            Field::Number(name) => number(run.spec.number(name)),
             Field::Metric(name) if has_interval(metric(name)) => interval(metric(name).interval(run)),
             Field::Metric(name) => number(metric(name).value(run)),
             Field::About("status") => Cell::Status(run.status),

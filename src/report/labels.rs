@@ -1,6 +1,8 @@
 //! Labels of combinations and scenes: as short as they can be and still differ.
 
 use super::style::{Legend, Look};
+use crate::claim::axis_value;
+use crate::registry::format_sum;
 use crate::results::{RunResult, StudyResults};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,13 +20,16 @@ pub struct Names {
 }
 
 /// Names of all runs, in their order. A walk is named only where runs of the
-/// same structure differ in it; a machine class or series only when they vary.
+/// same structure differ in it; an arithmetic where it is not the usual one or where
+/// runs of one method differ in it; a machine class or series only when they vary.
 fn names(results: &StudyResults) -> Vec<Names> {
     let mut walks: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     let mut paths: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    let mut usual_only: BTreeMap<(&str, &str), bool> = BTreeMap::new();
     for run in &results.runs {
         walks.entry(&run.structure).or_default().insert(&run.walk);
         paths.entry(run.scene()).or_default().insert(&run.spec.path.name);
+        *usual_only.entry((&run.structure, &run.culling)).or_insert(true) &= !run.spec.axes.contains_key("arithmetic");
     }
     let machines: BTreeSet<&str> = results.runs.iter().map(|r| r.machine_class.as_str()).collect();
     let series: BTreeSet<String> = results.runs.iter().map(|r| r.spec.series.to_string()).collect();
@@ -33,7 +38,10 @@ fn names(results: &StudyResults) -> Vec<Names> {
         if walks[run.structure.as_str()].len() > 1 {
             rest += &format!(" × {}", run.walk);
         }
-        for part in run.spec.axes.values() {
+        if !usual_only[&(run.structure.as_str(), run.culling.as_str())] && !run.spec.axes.contains_key("arithmetic") {
+            rest += &format!(" × {}", format_sum(&axis_value(&run.spec, "arithmetic")));
+        }
+        for part in run.spec.further() {
             rest += &format!(" × {part}");
         }
         if machines.len() > 1 {
@@ -48,7 +56,7 @@ fn names(results: &StudyResults) -> Vec<Names> {
             place,
             variant: format!("{}{rest}", run.structure),
             culling: run.culling.clone(),
-            combination: format!("{}{rest}", run.label()),
+            combination: format!("{} × {}{rest}", run.structure, run.culling),
         }
     };
     results.runs.iter().map(name).collect()

@@ -47,9 +47,48 @@ pub fn fingerprint(source: &SceneSource, winding: Winding, up: Up, scale: f64, w
             let (entry, _) = registry::find("generator", generate::ALL, &resolved)?;
             part(resolved.to_string().as_bytes());
             part(&entry.revision.to_le_bytes());
+            if scale != 1.0 {
+                // Walks through it are made before it is scaled, which once was otherwise.
+                part(b"placed after the walk");
+            }
         }
     }
     Ok(h.finalize().to_hex()[..32].to_string())
+}
+
+/// The scene of `spec` moved to `offset_m`, with the fingerprint of that place.
+pub fn moved(mut spec: SceneSpec, offset_m: [f64; 3]) -> SceneSpec {
+    if offset_m != [0.0; 3] {
+        let mut h = blake3::Hasher::new();
+        h.update(b"cullmark scene moved");
+        h.update(spec.fingerprint.as_bytes());
+        for x in offset_m {
+            h.update(&x.to_bits().to_le_bytes());
+        }
+        spec.fingerprint = h.finalize().to_hex()[..32].to_string();
+        spec.offset_m = offset_m;
+    }
+    spec
+}
+
+/// The scene that walks are made in, and the placement that then takes scene and walk
+/// to where `spec` wants them; `None` where that is the scene itself.
+///
+/// A moved scene is walked where it was, so that at every distance the walk is the
+/// same. A scale says what a unit of a file is, and who walks has human size; a
+/// generated scene is in metres already, so there the walk is scaled too.
+///
+/// # Errors
+/// Those of [`fingerprint`].
+pub fn unplaced(spec: &SceneSpec) -> Result<Option<(SceneSpec, Placement)>> {
+    let placement = Placement::of(spec)?;
+    let generated = matches!(spec.source, SceneSource::Generated(_));
+    let scale = if generated { 1.0 } else { spec.scale };
+    if spec.offset_m == [0.0; 3] && scale == spec.scale {
+        return Ok(None);
+    }
+    let base = describe(&spec.name, spec.source.clone(), spec.winding, Some(spec.up), scale, spec.weld)?;
+    Ok(Some((base, Placement { up: Up::Z, scale: spec.scale / scale, ..placement })))
 }
 
 /// A spec with its fingerprint. `up` defaults to y for files and z for generators.
@@ -69,7 +108,8 @@ pub fn describe(
         SceneSource::Generated(_) => Up::Z,
     });
     let fingerprint = fingerprint(&source, winding, up, scale, weld)?;
-    Ok(SceneSpec { name: name.to_string(), source, winding, up, scale, weld, fingerprint })
+    let name = name.to_string();
+    Ok(SceneSpec { name, source, winding, up, scale, weld, offset_m: [0.0; 3], fingerprint })
 }
 
 /// Reads or generates a scene: world metres, z up, sanitised, anchored, probed.
@@ -129,8 +169,8 @@ pub fn load_cached(spec: &SceneSpec, cache_dir: &Path) -> Result<Scene> {
         scene.name = spec.name.clone(); // a label, not part of the identity
         return Ok(scene);
     }
-    let now = fingerprint(&spec.source, spec.winding, spec.up, spec.scale, spec.weld)?;
-    if now != spec.fingerprint {
+    let now = describe(&spec.name, spec.source.clone(), spec.winding, Some(spec.up), spec.scale, spec.weld)?;
+    if moved(now, spec.offset_m).fingerprint != spec.fingerprint {
         let mut e = Error::new(format!("scene `{}` is not what it was when the run was planned", spec.name));
         if let SceneSource::File(path) = &spec.source {
             e = e.in_file(path);

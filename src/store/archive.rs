@@ -12,8 +12,8 @@ use sqlx::{FromRow, Sqlite, Transaction};
 use std::path::Path;
 
 const MAGIC: &[u8; 15] = b"CULLMARK STUDY\n";
-/// Raised when a row type below changes.
-const VERSION: u32 = 1;
+/// Raised when a row type below changes. Version 1 had no sweeps.
+const VERSION: u32 = 2;
 const LEVEL: i32 = 9;
 const HEADER: usize = MAGIC.len() + 4 + blake3::OUT_LEN;
 
@@ -89,6 +89,8 @@ struct Archive {
     counters: Vec<Counter>,
     judgements: Vec<Judged>,
     environments: Vec<Machine>,
+    /// At the end, so that what was written before there were sweeps is a prefix.
+    sweeps_json: String,
 }
 
 /// What an import brought.
@@ -147,6 +149,11 @@ impl Store {
                 format!("environment_id IN (SELECT environment_id FROM trials WHERE {OF_STUDY})"),
                 "environment_id"
             ),
+            sweeps_json: sqlx::query_scalar("SELECT sweeps_json FROM studies WHERE id = $1")
+                .bind(id)
+                .fetch_one(&mut *tx)
+                .await
+                .map_err(explain)?,
         };
         let plain = postcard::to_stdvec(&archive).map_err(|e| Error::new(format!("packing the study: {e}")))?;
         let payload = zstd::bulk::compress(&plain, LEVEL).map_err(|e| Error::new(format!("packing the study: {e}")))?;
@@ -196,9 +203,11 @@ fn unpack(bytes: &[u8]) -> Result<Archive> {
     }
     let (head, payload) = bytes.split_at(HEADER);
     let version = u32::from_le_bytes(head[MAGIC.len()..MAGIC.len() + 4].try_into().expect("four bytes"));
-    if version != VERSION {
-        return Err(Error::new(format!("its format is version {version}; this cullmark reads version {VERSION}"))
-            .help("use the cullmark that wrote it"));
+    if !(1..=VERSION).contains(&version) {
+        return Err(Error::new(format!(
+            "its format is version {version}; this cullmark reads up to version {VERSION}"
+        ))
+        .help("use the cullmark that wrote it"));
     }
     let damaged = || {
         Error::new("the exported study is damaged: its hash does not match its content")
@@ -207,7 +216,10 @@ fn unpack(bytes: &[u8]) -> Result<Archive> {
     if blake3::hash(payload).as_bytes()[..] != head[MAGIC.len() + 4..] {
         return Err(damaged());
     }
-    let plain = zstd::stream::decode_all(payload).map_err(|_| damaged())?;
+    let mut plain = zstd::stream::decode_all(payload).map_err(|_| damaged())?;
+    if version == 1 {
+        plain.extend(postcard::to_stdvec("[]").expect("a string is plain data"));
+    }
     postcard::from_bytes(&plain).map_err(|_| damaged())
 }
 
@@ -223,13 +235,21 @@ async fn put(tx: &mut Transaction<'_, Sqlite>, archive: Archive, label: String) 
         counters,
         judgements,
         environments,
+        sweeps_json,
     } = archive;
-    study.insert(tx).await?;
+    let added = study.insert(tx).await?;
     let study_id: i64 = sqlx::query_scalar("SELECT id FROM studies WHERE name = $1 AND series = $2")
         .bind(&study.name)
         .bind(study.series)
         .fetch_one(&mut **tx)
         .await?;
+    if added > 0 {
+        sqlx::query("UPDATE studies SET sweeps_json = $1 WHERE id = $2")
+            .bind(sweeps_json)
+            .bind(study_id)
+            .execute(&mut **tx)
+            .await?;
+    }
     for run in &mut runs {
         run.study_id = study_id;
         run.insert(tx).await?;

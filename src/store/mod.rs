@@ -204,9 +204,10 @@ pub fn read_results(db: &Path, study: &str, detail: Detail) -> Result<crate::res
     })
 }
 
-/// How progress and logs call a run: `scene: structure × culling`.
+/// How progress and logs call a run: `scene: structure × culling`, further axes where they are not the usual ones.
 pub fn label(spec: &crate::record::RunSpec) -> String {
-    format!("{}: {} × {}", spec.scene.name, spec.structure, spec.culling_label())
+    let further: String = spec.further().iter().map(|l| format!(" × {l}")).collect();
+    format!("{}: {} × {}{further}", spec.scene.name, spec.structure, spec.culling_label())
 }
 
 /// Milliseconds since 1970, UTC.

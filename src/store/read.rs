@@ -50,6 +50,7 @@ pub(super) struct StudyRow {
     title: String,
     manifest_toml: String,
     claims_json: String,
+    sweeps_json: String,
     policy_json: String,
     consolidate_frames: i64,
     machine_class: String,
@@ -155,7 +156,7 @@ impl Store {
                 .await
                 .map_err(explain)?;
         Ok(StudyResults {
-            sweeps: Vec::new(),
+            sweeps: self.parse(&study.sweeps_json, "the sweeps")?,
             name: study.name,
             title: study.title,
             manifest_toml: study.manifest_toml,
@@ -244,7 +245,7 @@ impl Store {
             _ => (study, None),
         };
         let row: Option<StudyRow> = sqlx::query_as(
-            "SELECT id, name, title, manifest_toml, claims_json, policy_json, consolidate_frames, machine_class, \
+            "SELECT id, name, title, manifest_toml, claims_json, sweeps_json, policy_json, consolidate_frames, machine_class, \
              created_ms FROM studies WHERE (name = $1 AND $2 IS NULL) OR (name = $3 AND series = $2) \
              ORDER BY series DESC LIMIT 1",
         )

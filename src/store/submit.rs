@@ -30,6 +30,8 @@ pub struct Submission {
     pub manifest_toml: String,
     /// The manifest's claims as JSON, kept for the report.
     pub claims_json: String,
+    /// Its sweeps as JSON, likewise.
+    pub sweeps_json: String,
     pub consolidate_frames: u32,
     pub policy: RepeatPolicy,
     pub machine_class: String,
@@ -208,11 +210,13 @@ async fn put_study(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]
             .await?;
     let (study_id,): (i64,) = sqlx::query_as(
         "INSERT INTO studies (name, series, title, manifest_toml, claims_json, policy_json, consolidate_frames, \
-         machine_class, runs_hash, created_ms, submitted_ms) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $10) \
+         machine_class, runs_hash, created_ms, submitted_ms, sweeps_json) \
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $10, $11) \
          ON CONFLICT (name, series) DO UPDATE SET title = excluded.title, manifest_toml = excluded.manifest_toml, \
          claims_json = excluded.claims_json, policy_json = excluded.policy_json, \
          consolidate_frames = excluded.consolidate_frames, machine_class = excluded.machine_class, \
-         runs_hash = excluded.runs_hash, submitted_ms = excluded.submitted_ms RETURNING id",
+         runs_hash = excluded.runs_hash, submitted_ms = excluded.submitted_ms, sweeps_json = excluded.sweeps_json \
+         RETURNING id",
     )
     .bind(&s.name)
     .bind(i64::from(s.series))
@@ -224,6 +228,7 @@ async fn put_study(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]
     .bind(&s.machine_class)
     .bind(&runs_hash)
     .bind(now_ms())
+    .bind(&s.sweeps_json)
     .fetch_one(&mut **tx)
     .await?;
     if before.is_some_and(|(_, hash)| hash == runs_hash) {

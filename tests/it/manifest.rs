@@ -1,10 +1,15 @@
 //! Manifests and their matrices: what is read, what is refused and how it is said.
 
+mod axes;
+mod families;
+mod ids;
 mod mistakes;
+mod mistakes_axes;
 mod mistakes_matrix;
 mod mistakes_rules;
 mod mistakes_sections;
 mod shapes;
+mod sweeps;
 
 use cullmark::Error;
 use cullmark::manifest::Manifest;

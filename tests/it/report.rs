@@ -1,5 +1,7 @@
 //! Reports from synthetic results: every status, several scenes, replicated noise.
 
+#[path = "report/axes.rs"]
+mod axes;
 #[path = "report/fixture.rs"]
 mod fixture;
 #[path = "report/own_values.rs"]

@@ -2,6 +2,7 @@
 //! that what is written reads back.
 
 mod gltf;
+mod placement;
 
 use crate::common::{shared, shared_scenes, soup};
 use cullmark::error::Error;

@@ -5,11 +5,11 @@ pub mod csv;
 pub mod generate;
 
 use super::placement::Placement;
-use super::{Scene, cache};
+use super::{Scene, cache, load as scenes};
 use crate::error::{Error, Result};
 use crate::math::Pose;
 use crate::record::{PathSource, PathSpec, SceneSpec};
-use crate::registry;
+use crate::registry::{self, Spec};
 use std::path::Path;
 
 /// Raised when the same file or walk gives different poses.
@@ -47,7 +47,7 @@ pub fn fingerprint(source: &PathSource, scene_fingerprint: &str) -> Result<Strin
 /// A malformed file (line and column named), a walk that finds no free space, or
 /// no frame at all.
 pub fn load(path: &PathSpec, scene_spec: &SceneSpec, scene: &Scene) -> Result<Vec<Pose>> {
-    select(path, whole(path, scene_spec, scene)?)
+    select(path, whole(path, scene_spec, scene, None)?)
 }
 
 /// Like [`load`]; generated walks are kept in `cache_dir/paths/<fingerprint>.bin`.
@@ -68,21 +68,40 @@ pub fn load_cached(path: &PathSpec, scene_spec: &SceneSpec, scene: &Scene, cache
         }
         return Err(e.help("the file changed, or another version of cullmark planned it: start the study again"));
     }
-    let poses = whole(path, scene_spec, scene)?;
+    let poses = whole(path, scene_spec, scene, Some(cache_dir))?;
     if generated {
         cache::store_path(&file, &poses);
     }
     select(path, poses)
 }
 
-fn whole(path: &PathSpec, scene_spec: &SceneSpec, scene: &Scene) -> Result<Vec<Pose>> {
+fn whole(path: &PathSpec, scene_spec: &SceneSpec, scene: &Scene, cache_dir: Option<&Path>) -> Result<Vec<Pose>> {
     match &path.source {
         PathSource::File(file) => {
             let placement = Placement::of(scene_spec)?;
             Ok(csv::read(file)?.iter().map(|f| placement.pose(&f.pose)).collect())
         }
-        PathSource::Generated(spec) => generate::make(spec)?.0.walk(scene),
+        PathSource::Generated(spec) => match scenes::unplaced(scene_spec)? {
+            None => generate::make(spec)?.0.walk(scene),
+            Some((base, placement)) => {
+                let poses = walk_in(&path.source, spec, &base, cache_dir)?;
+                Ok(poses.iter().map(|p| placement.pose(p)).collect())
+            }
+        },
     }
+}
+
+/// The walk `spec` in a scene that is yet to be placed; all its places share it.
+fn walk_in(source: &PathSource, spec: &Spec, base: &SceneSpec, cache_dir: Option<&Path>) -> Result<Vec<Pose>> {
+    let (walker, _) = generate::make(spec)?;
+    let Some(cache_dir) = cache_dir else { return walker.walk(&scenes::load(base)?) };
+    let file = cache::path_file(cache_dir, &fingerprint(source, &base.fingerprint)?);
+    if let Some(poses) = cache::fetch_path(&file) {
+        return Ok(poses);
+    }
+    let poses = walker.walk(&scenes::load_cached(base, cache_dir)?)?;
+    cache::store_path(&file, &poses);
+    Ok(poses)
 }
 
 fn select(path: &PathSpec, poses: Vec<Pose>) -> Result<Vec<Pose>> {

@@ -54,7 +54,7 @@ fn mistakes_in_sections_scenes_and_paths_name_place_and_remedy() {
             (with("[camera]\nprojection = \"fisheye\""), 10, 14, "camera.projection", "is \"fisheye\"", "perspective"),
             (with("[camera]\nprojection = \"orthographic\""), 9, 2, "camera.height_m", "is missing", "height_m"),
             (with("[camera]\nheight_m = 3"), 10, 12, "camera.height_m", "orthographic camera", "fov_y_deg"),
-            (with("[camera]\nfov_y_deg = 180"), 10, 13, "camera.fov_y_deg", "degrees", "175"),
+            (with("[camera]\nfov_y_deg = 180"), 10, 13, "camera.fov_y_deg", "degrees", "179"),
             (with("[camera]\naspect = \"16x9\""), 10, 10, "camera.aspect", "no aspect", "16:9"),
             (with("[camera]\nnear_m = 2\nfar_m = 1"), 11, 9, "camera.far_m", "not beyond near_m", "inf"),
             (with("[camera]\nfar_m = nan"), 10, 9, "camera.far_m", "is `nan`", "inf"),
@@ -83,14 +83,6 @@ fn mistakes_in_sections_scenes_and_paths_name_place_and_remedy() {
                 "scene.0.generate",
                 "unknown generator",
                 "`rooms`",
-            ),
-            (
-                alone("[[scene]]\nname = \"a\"\ngenerate = { kind = \"rooms\", world = [1, 2] }"),
-                8,
-                12,
-                "scene.0.generate",
-                "means 2",
-                "single values",
             ),
             (
                 alone("[[scene]]\nname = \"a\"\ngenerate = { kind = \"rooms\", wrld = 1 }"),

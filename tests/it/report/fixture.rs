@@ -45,6 +45,7 @@ fn spec(scene: &str, structure: &str, culling: &str) -> RunSpec {
             up: Up::Z,
             scale: 1.0,
             weld: false,
+            offset_m: [0.0; 3],
             fingerprint: format!("scene-{scene}"),
         },
         path: PathSpec {

@@ -21,6 +21,7 @@ pub(super) fn spec(scene: &str, depth: i64) -> RunSpec {
             up: Up::Z,
             scale: 1.0,
             weld: false,
+            offset_m: [0.0; 3],
             fingerprint: format!("scene {scene}"),
         },
         path: PathSpec {
@@ -66,6 +67,7 @@ pub(super) fn study(name: &str, specs: Vec<RunSpec>, repeats: u32) -> Submission
         title: format!("Study {name}"),
         manifest_toml: "# nothing".into(),
         claims_json: "[]".into(),
+        sweeps_json: "[]".into(),
         consolidate_frames: 10,
         policy: policy(repeats),
         machine_class: "test".into(),

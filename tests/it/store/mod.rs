@@ -3,6 +3,7 @@
 
 mod figures;
 mod fixture;
+mod sweeps;
 
 use cullmark::culling::Class;
 use cullmark::results::RunStatus;
