@@ -17,7 +17,7 @@
 //! it runs over the ranges that the walk leaves, sixteen triangles at once.
 
 use super::facing_columns::*;
-use super::facing_fixed::{Corners, Fixed, FixedEye, corners};
+use super::facing_fixed::{Fixed, FixedEye, FixedTriangle, triangles};
 use super::facing_kernels::{Kernels, kernels};
 use super::triangle_words::WORD;
 use super::*;
@@ -50,7 +50,7 @@ enum State {
     Double { blocks: Vec<DoubleBlock>, eye: Eye64 },
     Filtered { blocks: Vec<PointBlock>, eye: Eye32, exact: Exact },
     Exact(Exact),
-    Fixed { corners: Vec<Corners>, unasked: Vec<u64>, eye: FixedEye },
+    Fixed { triangles: Vec<FixedTriangle>, unasked: Vec<u64>, eye: FixedEye },
 }
 
 /// Corners in f64 by position, and who is kept unasked.
@@ -108,7 +108,7 @@ impl BackFace {
             Arithmetic::Filtered => State::Filtered { blocks, eye, exact: Exact::default() },
             Arithmetic::Exact => State::Exact(Exact::default()),
             Arithmetic::FixedQ16 => {
-                State::Fixed { corners: Vec::new(), unasked: Vec::new(), eye: FixedEye::OutOfReach }
+                State::Fixed { triangles: Vec::new(), unasked: Vec::new(), eye: FixedEye::OutOfReach }
             }
         };
         BackFace { state, kernels, open: Vec::new(), failure: None }
@@ -150,10 +150,10 @@ impl Test for BackFace {
                 size_of_val(&blocks[..]) + exact.prepare(scene, hierarchy)
             }
             State::Exact(exact) => exact.prepare(scene, hierarchy),
-            State::Fixed { corners: c, unasked, .. } => {
-                *c = corners(scene, hierarchy);
+            State::Fixed { triangles: all, unasked, .. } => {
+                *all = triangles(scene, hierarchy);
                 *unasked = kept_unasked(scene, hierarchy);
-                size_of_val(&c[..]) + size_of_val(&unasked[..])
+                size_of_val(&all[..]) + size_of_val(&unasked[..])
             }
         }
     }
@@ -213,17 +213,15 @@ impl Test for BackFace {
                     exact.judge(w + i, *word, word, &mut predicates);
                 }
             }),
-            State::Fixed { corners, unasked, eye } => {
+            State::Fixed { triangles, unasked, eye } => {
                 let failure = &mut self.failure;
                 list.retain_words(|w, keep| {
                     for (i, word) in keep.iter_mut().enumerate() {
                         for bit in bits_of(*word & !unasked[w + i]) {
-                            match eye.judge(&corners[(w + i) * WORD + bit]) {
-                                Fixed::Back => *word &= !(1 << bit),
-                                Fixed::Kept => {}
-                                Fixed::Overflow => {
-                                    failure.get_or_insert_with(|| OVERFLOW.to_string());
-                                }
+                            let judged = eye.judge(&triangles[(w + i) * WORD + bit]);
+                            *word &= !(u64::from(judged == Fixed::Back) << bit);
+                            if judged == Fixed::Overflow {
+                                failure.get_or_insert_with(|| OVERFLOW.to_string());
                             }
                         }
                     }

@@ -17,12 +17,15 @@
 //! sum_i (|p_j| + |r_k| + |p_k| + |r_j| + 2) (|a_i| + 1) + |n_i|
 //! ```
 //! times `(1 + 2^-9)^3`, which `+ 1/128` of it covers. A triangle is culled iff the
-//! determinant exceeds that. All of it is exact in i128 (at most 105 bits); the
-//! normal is exact in i64 where the edges have 21 bits with their sign (16 m).
+//! determinant exceeds that. `n` does not depend on the eye and is exact in i64, as
+//! edges fit 31 bits; the determinant is exact in i128 (97 bits). The factors in
+//! brackets are kept in units of four quanta, rounded up, so that a triangle is one
+//! cache line.
 
 use crate::hierarchy::Hierarchy;
 use crate::math::{DVec3, View};
 use crate::scene::Scene;
+use rayon::prelude::*;
 
 /// Quanta a metre.
 const QUANTA: f64 = 65_536.0;
@@ -32,8 +35,48 @@ const REACH_M: f64 = (1u64 << 26) as f64;
 /// Fraction bits of a direction.
 const DIRECTION: f64 = (1u64 << 28) as f64;
 
-/// Corners in quanta from the scene origin; `None` where they have no such form.
-pub type Corners = Option<[[i64; 3]; 3]>;
+/// A triangle in quanta: everything that does not depend on the eye.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C, align(64))]
+pub struct FixedTriangle {
+    /// First corner, from the scene origin.
+    corner: [i64; 3],
+    normal: [i64; 3],
+    /// Most by which a coordinate of the normal may be off, in units of four.
+    normal_off: [u32; 3],
+    /// Longest coordinate of an edge from the first corner, or [`OUT_OF_REACH`].
+    reach: u32,
+}
+
+/// The triangle has no fixed-point form.
+const OUT_OF_REACH: u32 = u32::MAX;
+
+const NOWHERE: FixedTriangle =
+    FixedTriangle { corner: [0; 3], normal: [0; 3], normal_off: [0; 3], reach: OUT_OF_REACH };
+
+impl FixedTriangle {
+    /// From corners relative to the scene origin, metres.
+    pub fn new(corners: &[DVec3; 3]) -> FixedTriangle {
+        let [Some(v0), Some(v1), Some(v2)] = corners.map(quanta) else { return NOWHERE };
+        let minus = |v: [i64; 3]| [0, 1, 2].map(|i| v[i] - v0[i]);
+        let (p, r) = (minus(v1), minus(v2));
+        let reach = p.iter().chain(&r).fold(0, |m, x| m.max(x.abs()));
+        if reach > i64::from(i32::MAX) {
+            return NOWHERE;
+        }
+        let axes = [(1, 2), (2, 0), (0, 1)];
+        FixedTriangle {
+            corner: v0,
+            normal: axes.map(|(j, k)| p[j] * r[k] - p[k] * r[j]),
+            normal_off: axes.map(|(j, k)| {
+                let off = p[j].abs() + r[k].abs() + p[k].abs() + r[j].abs() + 2;
+                // Below 2^33 + 2, so a quarter fits.
+                (off as u64).div_ceil(4) as u32
+            }),
+            reach: reach as u32,
+        }
+    }
+}
 
 /// What a triangle is to the fixed-point test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,13 +96,10 @@ fn quanta(metres: DVec3) -> Option<[i64; 3]> {
     fits.then(|| metres.to_array().map(|x| libm::floor(x * QUANTA + 0.5) as i64))
 }
 
-/// Corners of every entry position.
-pub fn corners(scene: &Scene, hierarchy: &Hierarchy) -> Vec<Corners> {
-    let of = |t: &u32| {
-        let [a, b, c] = scene.corners(*t).map(|p| quanta(p - hierarchy.origin));
-        Some([a?, b?, c?])
-    };
-    hierarchy.entries.iter().map(of).collect()
+/// Triangle of every entry position.
+pub fn triangles(scene: &Scene, hierarchy: &Hierarchy) -> Vec<FixedTriangle> {
+    let of = |t: &u32| FixedTriangle::new(&scene.corners(*t).map(|p| p - hierarchy.origin));
+    hierarchy.entries.par_iter().with_min_len(1024).map(of).collect()
 }
 
 /// The eye, or the direction of parallel rays.
@@ -80,56 +120,27 @@ impl FixedEye {
         }
     }
 
-    /// Judges a triangle.
-    pub fn judge(&self, corners: &Corners) -> Fixed {
-        let (Some([v0, v1, v2]), false) = (corners, *self == FixedEye::OutOfReach) else { return Fixed::Overflow };
-        let relative = |v: &[i64; 3]| match self {
-            FixedEye::Point(e) => minus(v, e),
-            _ => Some([0; 3]),
-        };
-        // Every corner has to fit, though one decides.
-        let (Some(a), Some(_), Some(_)) = (relative(v0), relative(v1), relative(v2)) else { return Fixed::Overflow };
-        let (Some(p), Some(r)) = (minus(v1, v0), minus(v2, v0)) else { return Fixed::Overflow };
+    /// Judges a triangle. Its first corner has to fit Q15.16 with the rest of it around.
+    #[inline]
+    pub fn judge(&self, t: &FixedTriangle) -> Fixed {
         let a = match self {
-            FixedEye::Direction(d) => *d,
-            _ => a,
+            FixedEye::Point(e) => [0, 1, 2].map(|i| t.corner[i] - e[i]),
+            FixedEye::Direction(d) if t.reach != OUT_OF_REACH => *d,
+            _ => return Fixed::Overflow,
         };
-        let (n, value) = determinant(p, r, a);
-        // Half of all triangles are settled without a bound.
-        if value > 0 && value > bound(p, r, a, n) { Fixed::Back } else { Fixed::Kept }
+        let farthest = a.iter().fold(0, |m, x| m.max(x.abs()));
+        if matches!(self, FixedEye::Point(_)) && farthest + i64::from(t.reach) > i64::from(i32::MAX) {
+            return Fixed::Overflow;
+        }
+        // No branch on the sign: it is as good as random.
+        let (mut value, mut off) = (0i128, 0i128);
+        for i in 0..3 {
+            value += i128::from(t.normal[i]) * i128::from(a[i]);
+            off += i128::from(4 * i64::from(t.normal_off[i])) * i128::from(a[i].abs() + 1);
+            off += i128::from(t.normal[i].unsigned_abs());
+        }
+        if value > off + (off >> 7) + 1 { Fixed::Back } else { Fixed::Kept }
     }
-}
-
-/// The difference if it fits Q15.16.
-fn minus(a: &[i64; 3], b: &[i64; 3]) -> Option<[i64; 3]> {
-    let d = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    d.iter().all(|x| i32::try_from(*x).is_ok()).then_some(d)
-}
-
-/// `n = p x r` and `n . a`.
-fn determinant(p: [i64; 3], r: [i64; 3], a: [i64; 3]) -> ([i128; 3], i128) {
-    let axes = [(1, 2), (2, 0), (0, 1)];
-    let small = p.iter().chain(&r).fold(0, |m, x| m | x.unsigned_abs()) < 1 << 20;
-    if small {
-        let n = axes.map(|(j, k)| p[j] * r[k] - p[k] * r[j]);
-        let term = |i: usize| i128::from(n[i]) * i128::from(a[i]);
-        (n.map(i128::from), term(0) + term(1) + term(2))
-    } else {
-        let wide = |x: i64, y: i64| i128::from(x) * i128::from(y);
-        let n = axes.map(|(j, k)| wide(p[j], r[k]) - wide(p[k], r[j]));
-        (n, n[0] * i128::from(a[0]) + n[1] * i128::from(a[1]) + n[2] * i128::from(a[2]))
-    }
-}
-
-/// The most by which that may be off.
-fn bound(p: [i64; 3], r: [i64; 3], a: [i64; 3], n: [i128; 3]) -> i128 {
-    let (p, r) = (p.map(i64::abs), r.map(i64::abs));
-    let all: i64 = p.iter().chain(&r).sum::<i64>() + 2;
-    let off = (0..3).fold(0, |sum, i| {
-        let n_off = all - p[i] - r[i];
-        sum + i128::from(n_off) * i128::from(a[i].abs() + 1) + n[i].abs()
-    });
-    off + (off >> 7) + 1
 }
 
 #[cfg(test)]
@@ -156,8 +167,7 @@ mod tests {
             let (v1, v2) = (v0 + point(3) * size, v0 + (point(3) + point(6) * libm::exp2(-f64::from(sharp))) * size);
             // Grazing: the eye a hair's breadth beside the plane.
             let e = v0 + (v1 - v0) * m[9] * 3.0 + (v2 - v0) * m[10] * 3.0 + DVec3::splat(m[11] * libm::exp2(-f64::from(sharp)));
-            let corners: Corners = Some([v0, v1, v2].map(|v| quanta(v).unwrap()));
-            if at(e).judge(&corners) == Fixed::Back {
+            if at(e).judge(&FixedTriangle::new(&[v0, v1, v2])) == Fixed::Back {
                 prop_assert_ne!(facing(v0, v1, v2, e), Facing::Front);
             }
         }
@@ -172,35 +182,33 @@ mod tests {
             let shift = DVec3::from_array(shift.map(|s| f64::from(s) / QUANTA));
             let point = |i: usize| (DVec3::new(m[i], m[i + 1], m[i + 2]) * 1073741824.0).round() / 1073741824.0;
             let judge = |by: DVec3| {
-                let corners = [point(0), point(3), point(6)].map(|p| quanta(p + by).unwrap());
-                at(point(9) + by).judge(&Some(corners))
+                at(point(9) + by).judge(&FixedTriangle::new(&[point(0), point(3), point(6)].map(|p| p + by)))
             };
             prop_assert_eq!(judge(shift), judge(DVec3::ZERO));
         }
     }
 
     #[test]
-    fn the_narrow_and_the_wide_product_agree() {
-        let (p, r) = ([1_048_575, -77, 3], [-5, 1_048_575, 1_048_575]);
-        let wide = |i: usize, j: usize| i128::from(p[i]) * i128::from(r[j]) - i128::from(p[j]) * i128::from(r[i]);
-        let a = [i64::from(i32::MAX), i64::from(i32::MIN), 9];
-        let want = wide(1, 2) * i128::from(a[0]) + wide(2, 0) * i128::from(a[1]) + wide(0, 1) * i128::from(a[2]);
-        assert_eq!(determinant(p, r, a).1, want);
-        let halves = [p, r].map(|v| v.map(|x| x / 2));
-        let [n, _] = [determinant(halves[0], halves[1], a).0, [0; 3]];
-        assert_eq!(n[2], i128::from(halves[0][0] * halves[1][1] - halves[0][1] * halves[1][0]));
+    fn the_widest_triangle_that_fits_does_not_overflow_its_normal() {
+        let edge = f64::from(i32::MAX) / QUANTA;
+        let corners = [DVec3::ZERO, DVec3::new(edge, -edge, 0.0), DVec3::new(edge, edge, 0.0)];
+        let t = FixedTriangle::new(&corners);
+        assert_eq!((t.normal[2], t.reach), (2 * i64::from(i32::MAX).pow(2), i32::MAX as u32));
+        assert_eq!(FixedEye::Direction([0, 0, 1 << 28]).judge(&t), Fixed::Back, "its normal points along the rays");
+        assert_eq!(FixedEye::Direction([0, 0, -1 << 28]).judge(&t), Fixed::Kept);
+        assert_eq!(FixedTriangle::new(&corners.map(|c| c * 1.001)), NOWHERE);
     }
 
     // H.3: beyond 32,768 m there is an error, never a wrap.
     #[test]
     fn overflow_is_told_and_never_wraps() {
-        let triangle = |x: f64| Some([[x, 0.0, 0.0], [x, 1.0, 0.0], [x, 0.0, 1.0]].map(|p| quanta(p.into()).unwrap()));
-        assert_eq!(at(DVec3::ZERO).judge(&triangle(32_767.0)), Fixed::Back, "its normal points away, along +x");
+        let triangle = |x: f64| FixedTriangle::new(&[[x, 0.0, 0.0], [x, 1.0, 0.0], [x, 0.0, 1.0]].map(DVec3::from));
+        assert_eq!(at(DVec3::ZERO).judge(&triangle(32_766.0)), Fixed::Back, "its normal points away, along +x");
         assert_eq!(at(DVec3::ZERO).judge(&triangle(32_769.0)), Fixed::Overflow);
         assert_eq!(at(DVec3::X * 10_000.0).judge(&triangle(32_769.0)), Fixed::Back);
         assert_eq!(at(DVec3::X * -10_000.0).judge(&triangle(30_000.0)), Fixed::Overflow);
         assert_eq!(quanta(DVec3::splat(1e8)), None);
-        assert_eq!(at(DVec3::ZERO).judge(&None), Fixed::Overflow);
+        assert_eq!(at(DVec3::ZERO).judge(&NOWHERE), Fixed::Overflow);
         assert_eq!(FixedEye::OutOfReach.judge(&triangle(1.0)), Fixed::Overflow);
     }
 }
