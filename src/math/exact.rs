@@ -10,16 +10,22 @@ use std::cmp::Ordering;
 
 /// Sign and magnitude, least significant word first, no leading zero words.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Whole {
+pub(crate) struct Whole {
     negative: bool,
     words: Vec<u32>,
 }
 
 impl Whole {
     /// `x / 2^unit`, which the caller knows to be whole.
-    fn of(x: f64, unit: i32) -> Whole {
-        let (mantissa, exponent) = decompose(x);
-        let shift = if mantissa == 0 { 0 } else { (exponent - unit) as usize };
+    pub(crate) fn of(x: f64, unit: i32) -> Whole {
+        let (mut mantissa, exponent) = decompose(x);
+        let mut shift = 0;
+        if exponent >= unit && mantissa != 0 {
+            shift = (exponent - unit) as usize;
+        } else {
+            // The bits that fall off are zeros.
+            mantissa = mantissa.checked_shr((unit - exponent) as u32).unwrap_or(0);
+        }
         let mut words = vec![0; shift / 32];
         let wide = u128::from(mantissa) << (shift % 32);
         words.extend((0..4).map(|i| (wide >> (32 * i)) as u32));
@@ -33,11 +39,11 @@ impl Whole {
         self
     }
 
-    fn minus(&self, o: &Whole) -> Whole {
+    pub(crate) fn minus(&self, o: &Whole) -> Whole {
         self.plus(&Whole { negative: !o.negative, words: o.words.clone() })
     }
 
-    fn plus(&self, o: &Whole) -> Whole {
+    pub(crate) fn plus(&self, o: &Whole) -> Whole {
         if self.negative == o.negative {
             return Whole { negative: self.negative, words: add(&self.words, &o.words) };
         }
@@ -48,7 +54,7 @@ impl Whole {
         .trimmed()
     }
 
-    fn times(&self, o: &Whole) -> Whole {
+    pub(crate) fn times(&self, o: &Whole) -> Whole {
         let mut words = vec![0u32; self.words.len() + o.words.len()];
         for (i, a) in self.words.iter().enumerate() {
             let mut carry = 0u64;
@@ -75,7 +81,17 @@ impl Whole {
         Whole { negative: self.negative, words }.trimmed()
     }
 
-    fn sign(&self) -> Ordering {
+    /// `(m, e)` with the number between `m 2^e` and the next f64 away from zero.
+    pub(crate) fn leading(&self) -> (f64, i32) {
+        let top = self.words.iter().rev().take(4).fold(0u128, |m, w| m << 32 | u128::from(*w));
+        let below = 32 * self.words.len().saturating_sub(4) as i32;
+        // Cut to the 53 bits that an f64 holds, so that the cast is exact.
+        let spare = (75 - top.leading_zeros() as i32).max(0);
+        let m = (top >> spare) as f64;
+        (if self.negative { -m } else { m }, below + spare)
+    }
+
+    pub(crate) fn sign(&self) -> Ordering {
         match (self.words.is_empty(), self.negative) {
             (true, _) => Ordering::Equal,
             (_, true) => Ordering::Less,
@@ -121,6 +137,12 @@ fn decompose(x: f64) -> (u64, i32) {
     let bits = x.to_bits();
     let (field, fraction) = ((bits >> 52 & 0x7ff) as i32, bits & ((1 << 52) - 1));
     if field == 0 { (fraction, -1074) } else { (fraction | 1 << 52, field - 1075) }
+}
+
+/// The largest exponent whose power of two divides `x`; 0 for 0.
+pub(crate) fn unit_of(x: f64) -> i32 {
+    let (mantissa, exponent) = decompose(x);
+    if mantissa == 0 { 0 } else { exponent + mantissa.trailing_zeros() as i32 }
 }
 
 /// The sign of `det(v0 - e, v1 - e, v2 - e)`, rows.
@@ -206,6 +228,21 @@ mod tests {
             prop_assert_eq!(sign_of_plane(point(0), d as f64 * small, point(3), point(6), point(9)), want);
             let want = (i128::from(dot) + (i128::from(d) << shift)).cmp(&0);
             prop_assert_eq!(sign_of_plane(point(0), d as f64 / small, point(3), point(6), point(9)), want);
+        }
+    }
+
+    #[test]
+    fn leading_digits_are_those_of_the_number() {
+        for x in [0.0, 1.0, -3.0, 0.1, 1e300, -7e-12, 6.02e23] {
+            for unit in [unit_of(x), unit_of(x) - 90] {
+                let whole = Whole::of(x, unit);
+                let (m, e) = whole.leading();
+                assert_eq!(libm::ldexp(m, e + unit), x);
+                // Squared it has more digits than an f64, which are cut towards zero.
+                let (m, e) = whole.times(&whole).leading();
+                let square = libm::ldexp(m, e + 2 * unit);
+                assert!(square <= x * x * (1.0 + 3e-16) && square >= x * x * (1.0 - 5e-16), "{x}");
+            }
         }
     }
 

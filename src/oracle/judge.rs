@@ -7,6 +7,7 @@
 use super::bits::BitSet;
 use super::footprint::Lens;
 use super::image::{ANY, BACKGROUND, Grid, Run, TileRect};
+use super::outline::{Outline, Screen};
 use super::volume::triangle_meets;
 use super::{FrameTruth, Standing};
 use crate::culling::Removes;
@@ -85,7 +86,8 @@ pub fn losses(scene: &Scene, view: &View, truth: &FrameTruth, submitted: &Submit
 
     // Image space.
     let lens = Lens::new(view, truth.grid);
-    let judge = SampleJudge { scene, view, truth, lens: &lens, submitted, lost_pieces: &lost_pieces };
+    let screen = Screen::new(view);
+    let judge = SampleJudge { scene, view, truth, lens: &lens, screen, submitted, lost_pieces: &lost_pieces };
     let mut found = Findings::new(truth.grid);
     for (index, tile) in (0u32..).zip(&truth.tiles) {
         let rect = truth.grid.tile(index);
@@ -159,6 +161,7 @@ struct SampleJudge<'a> {
     view: &'a View,
     truth: &'a FrameTruth,
     lens: &'a Lens,
+    screen: Screen,
     submitted: &'a Submitted,
     lost_pieces: &'a BTreeMap<u32, Vec<[DVec3; 3]>>,
 }
@@ -186,6 +189,20 @@ impl Findings {
         }
     }
 
+    /// The sample shows something else than `t`.
+    fn lose(&mut self, t: u32, x: u32, y: u32, rect: TileRect) {
+        self.image.lost.insert(self.image.grid.pixel(x, y) as u32);
+        self.lost_here.insert((y - rect.y0) * rect.width() as u32 + x - rect.x0);
+        self.seen_lost.insert(t);
+    }
+
+    /// `other` is drawn where `t` would be seen.
+    fn stands_in(&mut self, submitted: &Submitted, t: u32, other: u32) {
+        if !submitted.triangles.contains(t) {
+            self.replaced.entry(t).or_default().insert(other);
+        }
+    }
+
     /// Submitted triangles outside V_lo that are drawn for an equal one inside it:
     /// one each, since a class of equal surfaces is one thing to see.
     fn stand_ins(&self, lo: &BitSet, submitted: &BitSet) -> u64 {
@@ -210,29 +227,44 @@ impl SampleJudge<'_> {
         if self.drawn_whole(t) {
             return;
         }
-        // Whatever may be drawn in its place.
-        let one = [run.alternate.wrapping_sub(1)];
-        let others: &[u32] = match run.alternate {
-            BACKGROUND => &[],
-            ANY => match self.truth.bracket.ties_of(t) {
-                Some(ties) => ties,
-                // Nothing is known of what ties here, so nothing is proved.
-                None => return,
-            },
-            _ => &one,
-        };
-        if let Some(other) = others.iter().find(|o| self.drawn_whole(**o)) {
-            if !self.submitted.triangles.contains(t) {
-                found.replaced.entry(t).or_default().insert(*other);
-            }
+        if run.alternate == ANY {
+            return self.run_of_many(run, t, rect, found);
+        }
+        let other = run.alternate.checked_sub(1);
+        if let Some(other) = other.filter(|o| self.drawn_whole(*o)) {
+            found.stands_in(self.submitted, t, other);
             return;
         }
         for x in run.x..run.x + run.len {
             let hit = |t: u32| self.drawn_at(t, x, run.y);
-            if !hit(t) && !others.iter().any(|o| hit(*o)) {
-                found.image.lost.insert(found.image.grid.pixel(x, run.y) as u32);
-                found.lost_here.insert((run.y - rect.y0) * rect.width() as u32 + x - rect.x0);
-                found.seen_lost.insert(t);
+            if !hit(t) && !other.is_some_and(hit) {
+                found.lose(t, x, run.y, rect);
+            }
+        }
+    }
+
+    /// Where three or more surfaces tie: lost if none of them is drawn.
+    fn run_of_many(&self, run: Run, t: u32, rect: TileRect, found: &mut Findings) {
+        // Without a list of what ties here nothing is proved.
+        let Some(ties) = self.truth.bracket.ties_of(t) else { return };
+        let drawn: Vec<Outline> = ties
+            .iter()
+            .filter(|o| self.submitted.triangles.contains(**o))
+            .filter_map(|o| {
+                let corners = self.scene.corners(*o).map(|p| self.view.to_camera(p));
+                Outline::new(&self.screen, *o, true, &corners)
+            })
+            .collect();
+        for x in run.x..run.x + run.len {
+            let at = [self.lens.xs[x as usize], self.lens.ys[run.y as usize]];
+            // The list is one for all samples of the winner: ask at each who is there.
+            let stands = |o: &&Outline| !o.misses(at) && self.drawn_at(o.triangle, x, run.y);
+            if self.drawn_at(t, x, run.y) {
+                continue;
+            }
+            match drawn.iter().find(stands) {
+                Some(other) => found.stands_in(self.submitted, t, other.triangle),
+                None => found.lose(t, x, run.y, rect),
             }
         }
     }
@@ -243,7 +275,7 @@ impl SampleJudge<'_> {
         let mut lost = 0;
         for w in self.truth.bracket.witnesses.iter().filter(|w| !drawn(&w.triangle)) {
             match w.tied.iter().find(|t| drawn(t)) {
-                Some(other) => _ = found.replaced.entry(w.triangle).or_default().insert(*other),
+                Some(other) => found.stands_in(self.submitted, w.triangle, *other),
                 None => lost += u64::from(found.seen_lost.insert(w.triangle)),
             }
         }

@@ -18,11 +18,13 @@
 pub mod bits;
 pub mod bracket;
 pub mod cache;
+pub mod clipping;
 pub mod footprint;
 pub mod hiding;
 pub mod image;
 pub mod item_buffer;
 pub mod judge;
+pub mod lines;
 pub mod outline;
 pub mod patch;
 pub mod rays;

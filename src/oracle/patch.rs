@@ -84,8 +84,10 @@ impl Faces<'_> {
         while let Some(at) = patch.get(next).copied() {
             next += 1;
             let outline = &self.outlines[at as usize];
-            let whole = outline.solid && outline.occluder;
-            if !whole || outline.key_over(&cell.meet(&outline.rect))[1] > self.screen.key_clear() {
+            // Over the whole cell, not its rectangle alone: that bounds only what the
+            // near plane leaves.
+            let beyond_near = outline.key_over(cell)[1] <= self.screen.key_clear();
+            if !(outline.solid && outline.occluder && beyond_near) {
                 return None;
             }
             for k in (0..3).filter(|k| outline.side_enters(*k, cell)) {

@@ -1,11 +1,16 @@
 //! Tests: oracle. Here the item buffer against a ray caster that shares nothing
 //! with it; below, judgements, truth files, every method, and `inspect`.
 
+mod bracket;
+mod clipping;
 mod extremes;
+mod figures;
 mod files;
 mod inspect;
 mod judgement;
+mod mutations;
 mod pairs;
+mod ties;
 
 use crate::common::soup;
 use cullmark::math::{Camera, DVec3, Pose, Projection, View};
@@ -203,6 +208,20 @@ fn the_item_buffer_agrees_with_rays_on_degenerate_arrangements() {
         push(&mut scene, [at(3.0, 0.0, -1.0), at(7.0, 0.0, -1.0), at(5.0, 0.0, 1.0)], true, true);
         agrees_with_rays(&scene, &camera, ahead(), [64, 36], 1);
         agrees_with_rays(&scene, &camera, ahead(), [33, 17], 3);
+    }
+}
+
+#[test]
+fn the_item_buffer_agrees_with_rays_at_every_number_of_samples() {
+    // Near planes through the soup, parallel rays, and triangles around the eye.
+    for samples in [1, 2, 4] {
+        for (seed, camera) in (30..).zip(cameras()) {
+            let mut scene = soup(seed, 70, 5.0, 4.0);
+            (0..scene.len()).for_each(|t| scene.two_sided[t] = t % 3 == 0);
+            let size = [68 / samples, 36 / samples];
+            let strict = agrees_with_rays(&scene, &camera, pose(DVec3::new(-1.0, 0.5, 0.0)), size, samples);
+            assert!(strict > 68 * 36 * 8 / 10, "only {strict} samples in general position");
+        }
     }
 }
 

@@ -61,6 +61,26 @@ fn inspect_takes_an_arithmetic_and_a_place() {
 }
 
 #[test]
+fn inspect_shows_the_bracket_where_it_is_asked_for() {
+    let dir = tempfile::tempdir().unwrap();
+    fixture(dir.path());
+    let method = ["--frame", "0", "--structure", "list", "--culling", "none"];
+    let plain = text(&inspect(dir.path(), &method).stdout);
+    assert!(!plain.contains("bracket"), "{plain}");
+    let asked = [&method[..], &["--witness-rays", "8", "--hiding-cells", "16"]].concat();
+    let lines = text(&inspect(dir.path(), &asked).stdout);
+    assert!(
+        lines.contains("bracket    2 to 2 visible: 0 more seen by rays (8 a triangle), 0 proved hidden"),
+        "{lines}"
+    );
+    assert!(lines.contains("in vain    1 to 1 of what is submitted"), "{lines}");
+    let out = inspect(dir.path(), &[&asked[..], &["--json"]].concat());
+    let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!((&json["hiding_cells"], &json["errors"]["visible_hi"]), (&16.into(), &2.into()));
+    assert_eq!((&json["observed_class"], &json["errors"]["submitted_invisible"]), (&"exact".into(), &1.into()));
+}
+
+#[test]
 fn inspect_says_what_is_wrong_and_what_to_do() {
     let dir = tempfile::tempdir().unwrap();
     fixture(dir.path());
