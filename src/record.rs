@@ -6,7 +6,7 @@ mod errors;
 pub use errors::{FrameErrors, observed_class};
 
 use crate::culling::{Class, Removes};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::hierarchy::BuildStats;
 use crate::math::{Arithmetic, Camera};
 use crate::registry::Spec;
@@ -245,10 +245,7 @@ impl RunSpec {
     /// If the axis holds no known name.
     pub fn arithmetic(&self) -> Result<Arithmetic> {
         let Some(spec) = self.axes.get(crate::math::arithmetic::NAME) else { return Ok(Arithmetic::default()) };
-        Arithmetic::named(&spec.kind).ok_or_else(|| {
-            Error::new(format!("there is no arithmetic `{}`", spec.kind))
-                .help(format!("known: {}", Arithmetic::NAMES.join(", ")))
-        })
+        Arithmetic::parse(&spec.kind)
     }
 
     pub fn culling_label(&self) -> String {

@@ -18,7 +18,6 @@ use crate::registry::{Spec, parse_sum};
 use crate::runner::{Setup, submitted};
 use crate::scene::{load, walkthrough};
 use crate::structure;
-use clap::builder::PossibleValuesParser;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -46,8 +45,8 @@ pub struct Args {
     #[arg(long, value_name = "SPEC", default_value = "auto")]
     walk: String,
     /// Numbers in which tests are evaluated that state none
-    #[arg(long, value_name = "NAME", default_value = "f32_relative", value_parser = PossibleValuesParser::new(Arithmetic::NAMES))]
-    arithmetic: String,
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = Arithmetic::parse)]
+    arithmetic: Arithmetic,
     /// Full vertical field of view of a perspective camera, degrees
     #[arg(long, value_name = "DEG", default_value_t = 60.0)]
     fov_y_deg: f64,
@@ -162,8 +161,7 @@ impl Method {
     fn parse(args: &Args) -> Result<Method> {
         let structure = structure::make(&Spec::parse(&args.structure)?).map_err(|e| e.key("--structure"))?.1;
         let mut culling = culling::make_tests(&parse_sum(&args.culling)?).map_err(|e| e.key("--culling"))?.1;
-        let arithmetic = Arithmetic::named(&args.arithmetic).expect("one of the possible values");
-        culling.iter_mut().for_each(|part| culling::state_arithmetic(part, arithmetic));
+        culling.iter_mut().for_each(|part| culling::state_arithmetic(part, args.arithmetic));
         let walk = match (args.walk.trim(), axes::axis("walk").and_then(|a| a.auto)) {
             ("auto", Some(auto)) => auto(&structure),
             (text, _) => Spec::parse(text)?,

@@ -106,15 +106,8 @@ fn arithmetics() -> Vec<Part> {
 }
 
 fn arithmetic_named(spec: &Spec) -> Result<Spec> {
-    if Arithmetic::named(&spec.kind).is_some() {
-        return spec.resolve(&[]);
-    }
-    let mut e = Error::new(format!("unknown arithmetic `{}`", spec.kind));
-    e.help = Some(match did_you_mean(&spec.kind, Arithmetic::NAMES.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => format!("known: {}", Arithmetic::NAMES.join(", ")),
-    });
-    Err(e)
+    Arithmetic::parse(&spec.kind)?;
+    spec.resolve(&[])
 }
 
 /// Where no part of the culling takes the axis, all its values are the same work.

@@ -6,6 +6,7 @@
 //! A test that knows them declares a parameter `arithmetic` ([`NAME`]); where it
 //! is not given, the axis of the same name decides.
 
+use crate::error::{Error, Result, did_you_mean};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -51,6 +52,16 @@ impl Arithmetic {
 
     pub fn named(name: &str) -> Option<Arithmetic> {
         Self::ALL.into_iter().find(|a| a.name() == name)
+    }
+
+    /// # Errors
+    /// With the nearest name there is, or all of them.
+    pub fn parse(name: &str) -> Result<Arithmetic> {
+        Self::named(name).ok_or_else(|| {
+            let near = did_you_mean(name, Self::NAMES.iter().copied()).map(|n| format!("did you mean `{n}`?"));
+            Error::new(format!("unknown arithmetic `{name}`"))
+                .help(near.unwrap_or_else(|| format!("known: {}", Self::NAMES.join(", "))))
+        })
     }
 
     /// Revision of the predicates: raised when an answer changes.

@@ -68,8 +68,8 @@ fn parameters_of_generators_are_swept_too() {
     assert_eq!(m.runs.len(), 6);
     let run = &m.runs[4];
     assert_eq!((labels(run).scene.as_str(), labels(run).path.as_str()), ("hall@world=2", "v@yaw_deg=45"));
-    assert_eq!((run.number("path.yaw_deg"), run.number("scene.world")), (Some(45.0), None), "a world is a choice");
-    assert!(matches!(&run.scene.source, SceneSource::Generated(s) if s.text("world") == "2"));
+    assert_eq!((run.number("path.yaw_deg"), run.number("scene.world")), (Some(45.0), Some(2.0)));
+    assert!(matches!(&run.scene.source, SceneSource::Generated(s) if s.params["world"].to_string() == "2"));
     assert!(matches!(&run.path.source, PathSource::Generated(s) if s.float("yaw_deg") == 45.0));
 }
 

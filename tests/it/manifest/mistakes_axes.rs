@@ -73,7 +73,7 @@ fn mistakes_in_places_and_families_name_place_and_remedy() {
             (own("offset_m = [1, -5]"), 6, 16, "scene.0.offset_m", "is `-5`", "from 0 to 1e12"),
             (own("offset_m = []"), 6, 12, "scene.0.offset_m", "empty list", "remove the key"),
             (own("offset_m = [[1, 2, 3]]"), 6, 13, "scene.0.offset_m", "list in a list", "{ x = 1e4"),
-            (own("offset_m = { x = 1, w = 2 }"), 6, 21, "scene.0.offset_m.w", "unknown key", "x, y, z"),
+            (own("offset_m = { x = 1, w = 2 }"), 6, 21, "scene.0.offset_m.w", "unknown key", "did you mean `x`"),
             (own("offset_m = { x = \"1\" }"), 6, 18, "scene.0.offset_m.x", "metres", "1e12"),
             (own("offset_m = { from = 1, to = 5 }"), 6, 12, "scene.0.offset_m", "either `steps`", "steps ="),
             (
@@ -108,7 +108,7 @@ fn mistakes_in_places_and_families_name_place_and_remedy() {
             (
                 own("PATH [[path]]\nname = \"v\"\ngenerate = { kind = \"static\", yaw_deg = [1, 400] }"),
                 9,
-                44,
+                45,
                 "path.0.generate.yaw_deg",
                 "from -360",
                 "correct it",

@@ -47,7 +47,7 @@ fn inspect_prints_counts_and_dumps_each_id_once_ascending() {
 fn inspect_takes_an_arithmetic_and_a_place() {
     let dir = tempfile::tempdir().unwrap();
     fixture(dir.path());
-    let method = ["--structure", "list", "--culling", "frustum", "--frame", "0", "--json"];
+    let method = ["--structure", "octree:depth=2,policy=R", "--culling", "frustum", "--frame", "0", "--json"];
     let json = |more: &[&str]| -> serde_json::Value {
         let out = inspect(dir.path(), &[&method[..], more].concat());
         assert!(out.status.success(), "{}", text(&out.stderr));
@@ -95,7 +95,7 @@ fn inspect_says_what_is_wrong_and_what_to_do() {
         (&["--frame", "0", "--structure", "list", "--far-m", "0.05"], "beyond the near plane"),
         (&["--frame", "0", "--structure", "list", "--fov-y-deg", "180"], "below 180 degrees"),
         (&["--frame", "0", "--structure", "list", "--aspect", "wide"], "16:9"),
-        (&["--frame", "0", "--structure", "list", "--arithmetic", "f63"], "f32_world, f32_relative, f64"),
+        (&["--frame", "0", "--structure", "list", "--arithmetic", "f63"], "did you mean `f64`?"),
         (&["--frame", "0", "--structure", "list", "--offset-m", "1,2"], "three numbers X,Y,Z"),
         (&["--frame", "0", "--structure", "list", "--dump-submitted", "no/such/folder"], "no/such/folder"),
         (&["--frame", "0", "--structure", "list", "--image", "no/such/folder.png"], "no/such/folder.png"),
