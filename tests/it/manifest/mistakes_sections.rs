@@ -59,6 +59,8 @@ fn mistakes_in_sections_scenes_and_paths_name_place_and_remedy() {
             (with("[camera]\nnear_m = 2\nfar_m = 1"), 11, 9, "camera.far_m", "not beyond near_m", "inf"),
             (with("[camera]\nfar_m = nan"), 10, 9, "camera.far_m", "is `nan`", "inf"),
             (with("[accuracy]\nsamples = 99"), 10, 11, "accuracy.samples", "from 1 to 16", "give"),
+            (with("[accuracy]\nhiding_cells = -1"), 10, 16, "accuracy.hiding_cells", "from 0 to 16384", "give"),
+            (with("[accuracy]\nwitness_rays = 2.5"), 10, 16, "accuracy.witness_rays", "from 0 to 100000", "give"),
             (with("[model]\nindex_ns = -1"), 10, 12, "model.index_ns", "nanoseconds", "0 or more"),
             (with("[[scene]]\nname = \"a\"\ngenerate = \"rooms\""), 10, 8, "scene.1.name", "names two scenes", "a_2"),
             (alone(""), 1, 1, "scene", "no scene", "[[scene]]"),
