@@ -123,3 +123,24 @@ fn a_scene_does_not_read_devices_that_it_names() {
     let scene = cullmark::scene::obj::read(Path::new("a.obj"), text).unwrap();
     assert!(scene.report.warnings.iter().any(|w| w.contains("not a regular file")), "{:?}", scene.report.warnings);
 }
+
+#[test]
+fn a_gltf_may_not_ask_for_more_zeros_than_it_could_hold() {
+    let with = |count: u32| {
+        let accessor = |n: u32| format!(r#"{{"componentType":5126,"count":{n},"type":"VEC3"}}"#);
+        let mesh = |a: u32| format!(r#"{{"primitives":[{{"attributes":{{"POSITION":{a}}}}}]}}"#);
+        let text = format!(
+            r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0,1]}}],"nodes":[{{"mesh":0}},{{"mesh":1}}],
+            "meshes":[{},{}],"accessors":[{},{}]}}"#,
+            mesh(0),
+            mesh(1),
+            accessor(count),
+            accessor(600_000)
+        );
+        cullmark::scene::gltf::read(Path::new("a.gltf"), text.as_bytes())
+    };
+    assert_eq!(with(300_000).unwrap().len(), 300_000);
+    // Neither is too many; both together are.
+    let e = with(600_000).unwrap_err();
+    assert!(e.message.contains("1200000 values without data"), "{e}");
+}
