@@ -2,6 +2,12 @@
 
 #[path = "report/fixture.rs"]
 mod fixture;
+#[path = "report/frontier.rs"]
+mod frontier;
+#[path = "report/repeatability.rs"]
+mod repeatability;
+#[path = "report/sweeps.rs"]
+mod sweeps;
 #[path = "report/xml.rs"]
 mod xml;
 
