@@ -5,7 +5,7 @@ use crate::culling::Class;
 use crate::record::{Environment, FrameErrors, RunSpec};
 use crate::sweep::Sweep;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct StudyResults {
@@ -23,6 +23,15 @@ pub struct StudyResults {
     /// Charts of an error against a stressor that the manifest asks for.
     #[serde(default)]
     pub sweeps: Vec<Sweep>,
+}
+
+/// One of several measurements of the same study (`run --series next`).
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Measured {
+    pub series: u32,
+    pub results: StudyResults,
+    /// By measurement: the hashes of what its trials submitted; one, when all is well.
+    pub frames_hashes: BTreeMap<String, BTreeSet<String>>,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]

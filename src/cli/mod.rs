@@ -5,6 +5,7 @@ pub mod compact;
 pub mod compare;
 pub mod exec;
 pub mod export;
+pub mod frontier;
 pub mod import;
 pub mod inspect;
 mod known;
@@ -13,6 +14,7 @@ pub mod plan;
 pub mod preflight;
 pub mod progress;
 pub mod query;
+pub mod repeatability;
 pub mod report;
 pub mod run;
 pub mod scene;
@@ -42,6 +44,10 @@ pub enum Verb {
     Query(query::Args),
     /// Set two studies or versions side by side
     Compare(compare::Args),
+    /// Who is on the front of run time against error, scene by scene
+    Frontier(frontier::Args),
+    /// A study measured more than once, compared with itself
+    Repeatability(repeatability::Args),
     /// One frame of one method: counters, errors, image, submitted ids
     Inspect(inspect::Args),
     /// Scenes: info, generate, convert
@@ -71,6 +77,8 @@ pub fn main() -> ExitCode {
         Verb::Report(a) => report::run(a),
         Verb::Query(a) => query::run(a),
         Verb::Compare(a) => compare::run(a),
+        Verb::Frontier(a) => frontier::run(a),
+        Verb::Repeatability(a) => repeatability::run(a),
         Verb::Inspect(a) => inspect::run(a),
         Verb::Scene(v) => scene::run(v),
         Verb::Path(v) => path::run(v),

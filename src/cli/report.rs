@@ -30,7 +30,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let beside = args.db.parent().unwrap_or(Path::new("")).join(&study);
     let out = args.out.unwrap_or(beside);
-    let files = report::write(&results, &claims, &out)?;
+    let series = store::read_series(&args.db, &study, Detail::Frames)?;
+    let files = report::write_with_series(&results, &claims, &series, &out)?;
     println!(
         "{} ({} charts as SVG and PNG, {} tables as CSV, Markdown and LaTeX)",
         files.page.display(),

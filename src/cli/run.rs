@@ -137,9 +137,10 @@ async fn study(
     let results = store.results_with(&name, detail).await?;
     let mut page = None;
     if !args.no_report && !stopped {
+        let all = store.all_series(&name, detail).await?;
         let shown = if series == 0 { manifest.study.name.clone() } else { name };
         let out = args.out.clone().unwrap_or_else(|| folder.join(shown));
-        let files = crate::report::write(&results, &manifest.claims(), &out)?;
+        let files = crate::report::write_with_series(&results, &manifest.claims(), &all, &out)?;
         store.record_artifacts(submitted.study_id, &out).await?;
         page = Some(files.page);
     }

@@ -10,7 +10,7 @@ use super::metrics::{frames, known};
 use super::rows::{self, Datum, Rows};
 use super::scatter::{self, Scatter};
 use super::style::IDLE;
-use crate::results::RunResult;
+use crate::results::{RunResult, RunStatus};
 
 pub fn all(grid: &Grid, judged: &[Judged]) -> Vec<Figure> {
     if grid.results.runs.is_empty() {
@@ -160,12 +160,24 @@ fn triangles_per_frame(grid: &Grid) -> Figure {
     )
 }
 
+/// Run time against error, and against what is submitted in vain.
 fn errors(grid: &Grid) -> Vec<Figure> {
     let judged = grid.runs().map(|r| r.errors.len()).max().unwrap_or(0);
     let samples = format!("Errors at {} of each path.", count(judged as u64, "judged frame", "judged frames"));
-    let front = format!("Dashed: Pareto front, its points named; what it dominates is faded.{}", dagger(grid));
-    let pair = |x: &'static str, y: &'static str| move |r: &RunResult| Some((known(x).value(r)?, known(y).value(r)?));
-    let working = |x, y| move |r: &RunResult| if r.culling == IDLE { None } else { pair(x, y)(r) };
+    let front = format!(
+        "Joined: the points that no other beats in both; hollow: behind them by less than the 95 % intervals (horizontal \
+         bars) can tell; faded: dominated beyond the intervals.{}",
+        dagger(grid)
+    );
+    let zero = "The bin below the break holds exact zeros; height says nothing in it.";
+    let wrong = grid.results.runs.iter().filter(|r| r.status == RunStatus::Wrong).count();
+    let wrong = match wrong {
+        0 => String::new(),
+        n => format!(
+            " {} for the declared class: a conservative method above zero is a bug, not a point, and is not drawn.",
+            count(n as u64, "run is wrong", "runs are wrong")
+        ),
+    };
     let chart = |what: Scatter, caption: String| with_caption(scatter::draw(grid, &what), caption);
     vec![
         chart(
@@ -176,10 +188,11 @@ fn errors(grid: &Grid) -> Vec<Figure> {
                 x_axis: "modelled frame time, mean (ms)",
                 y_axis: "false-cull pixels per million",
                 zero_bin: true,
-                point: &pair("frame_ms_model", "false_cull_ppm"),
+                x: known("frame_ms_model"),
+                y: known("false_cull_ppm"),
             },
             format!(
-                "Modelled frame time against pixels that lost their triangle; {}. {} {samples} {front} The shaded bin holds exact zeros.",
+                "Modelled frame time against pixels that lost their triangle; {}. {} {samples} {front} {zero}{wrong}",
                 basis(grid),
                 model_words(grid)
             ),
@@ -192,10 +205,11 @@ fn errors(grid: &Grid) -> Vec<Figure> {
                 x_axis: "culling time of the median frame (µs)",
                 y_axis: "false-cull pixels per million",
                 zero_bin: true,
-                point: &working("median_frame_us", "false_cull_ppm"),
+                x: known("median_frame_us"),
+                y: known("false_cull_ppm"),
             },
             format!(
-                "Measured culling time of the median frame against pixels that lost their triangle; {}. {samples} {front}{} The shaded bin holds exact zeros.",
+                "Measured culling time of the median frame against pixels that lost their triangle; {}. {samples} {front}{} {zero}{wrong}",
                 basis(grid),
                 without_idle(grid)
             ),
@@ -208,10 +222,13 @@ fn errors(grid: &Grid) -> Vec<Figure> {
                 x_axis: "culling time of the median frame (µs)",
                 y_axis: "submitted / visible triangles",
                 zero_bin: false,
-                point: &working("median_frame_us", "over_submission"),
+                x: known("median_frame_us"),
+                y: known("over_submission"),
             },
             format!(
-                "Measured culling time of the median frame against over-submission; {}. {samples} {front}{}",
+                "Measured culling time of the median frame against over-submission; {}. {samples} Points: against the \
+                 triangles that are proved visible; vertical bars reach down to the figure against those that are not proved \
+                 invisible, where hiding was bracketed. The truth lies between, for all methods alike. {front}{}{wrong}",
                 basis(grid),
                 without_idle(grid)
             ),

@@ -84,7 +84,7 @@ pub fn compare<'a>(first: &'a StudyResults, second: &'a StudyResults, metric: &s
 
 /// What makes two runs the same cell. By name, not by content: a study is also
 /// compared with one on a changed scene or algorithm, and a note says so.
-fn cell(run: &RunResult) -> String {
+pub(super) fn cell(run: &RunResult) -> String {
     let s = &run.spec;
     // The camera stands there by its numbers, however its manifest named it.
     let axes: Vec<String> =

@@ -186,6 +186,16 @@ pub fn y_grid(figure: &mut Figure, plot: Rect, scale: &Scale, wanted: usize) {
     figure.segment((plot.x, plot.y), (plot.x, plot.bottom()), FRAME, 1.0);
 }
 
+/// Two slanted strokes on a gap in the y axis around `y`.
+pub fn axis_break(figure: &mut Figure, plot: Rect, y: f64) {
+    let half = super::scale::BREAK / 2.0;
+    figure.rect(Rect::new(plot.x - 4.0, y - half, plot.w + 5.0, 2.0 * half), super::style::PAPER, 1.0);
+    for dy in [-half, half] {
+        figure.segment((plot.x - 5.0, y + dy + 2.5), (plot.x + 5.0, y + dy - 2.5), FRAME, 1.2);
+        figure.dashed(&[(plot.x + 5.0, y + dy), (plot.right(), y + dy)], FRAME, 0.8, 0.8, &[2.0, 3.0]);
+    }
+}
+
 pub fn x_title(figure: &mut Figure, plot: Rect, text: &str) {
     figure.label(plot.x + plot.w / 2.0, plot.bottom() + 32.0, text, plain(BODY, INK).middle());
 }

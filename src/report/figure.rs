@@ -90,6 +90,15 @@ pub enum Part {
     Label,
 }
 
+/// What a run of marks stands for: in SVG a group with a title and data attributes.
+#[derive(Debug, Clone)]
+pub struct Tag {
+    pub marks: std::ops::Range<usize>,
+    pub title: String,
+    /// `measurement-id` becomes `data-measurement-id`.
+    pub data: Vec<(&'static str, String)>,
+}
+
 #[derive(Debug, Clone)]
 pub struct Figure {
     /// File name without suffix.
@@ -103,6 +112,8 @@ pub struct Figure {
     pub height: f64,
     pub marks: Vec<Mark>,
     pub boxes: Vec<(Part, Rect)>,
+    /// In the order of their marks, never overlapping.
+    pub tags: Vec<Tag>,
 }
 
 impl Figure {
@@ -116,7 +127,15 @@ impl Figure {
             height,
             marks: Vec::new(),
             boxes: Vec::new(),
+            tags: Vec::new(),
         }
+    }
+
+    /// Marks that stand for a run: a reader finds in the SVG which.
+    pub fn tagged(&mut self, title: String, data: Vec<(&'static str, String)>, draw: impl FnOnce(&mut Figure)) {
+        let start = self.marks.len();
+        draw(self);
+        self.tags.push(Tag { marks: start..self.marks.len(), title, data });
     }
 
     pub fn line(&mut self, points: Vec<(f64, f64)>, colour: Colour, width: f64, alpha: f64) {
@@ -185,20 +204,22 @@ impl Figure {
     }
 
     pub fn marker(&mut self, x: f64, y: f64, radius: f64, shape: Shape, colour: Colour, alpha: f64) {
-        let r = radius;
-        let polygon = |f: &mut Figure, points: &[(f64, f64)]| {
-            let points = points.iter().map(|(dx, dy)| (x + dx * r, y + dy * r)).collect();
-            f.marks.push(Mark::Polygon { points, colour, alpha });
-        };
-        match shape {
-            Shape::Circle => self.marks.push(Mark::Circle { x, y, radius, colour, alpha }),
-            Shape::Square => polygon(self, &[(-0.85, -0.85), (0.85, -0.85), (0.85, 0.85), (-0.85, 0.85)]),
-            Shape::Diamond => polygon(self, &[(0.0, -1.2), (1.2, 0.0), (0.0, 1.2), (-1.2, 0.0)]),
-            Shape::Up => polygon(self, &[(0.0, -1.15), (1.1, 0.8), (-1.1, 0.8)]),
-            Shape::Down => polygon(self, &[(0.0, 1.15), (1.1, -0.8), (-1.1, -0.8)]),
-            Shape::Cross => polygon(self, &cross(0.0)),
-            Shape::Times => polygon(self, &cross(std::f64::consts::FRAC_PI_4)),
+        if shape == Shape::Circle {
+            return self.marks.push(Mark::Circle { x, y, radius, colour, alpha });
         }
+        let points = corners(shape).iter().map(|(dx, dy)| (x + dx * radius, y + dy * radius)).collect();
+        self.marks.push(Mark::Polygon { points, colour, alpha });
+    }
+
+    /// The outline of a marker on paper: "not told apart".
+    pub fn hollow(&mut self, x: f64, y: f64, radius: f64, shape: Shape, colour: Colour) {
+        let mut points: Vec<(f64, f64)> =
+            corners(shape).iter().map(|(dx, dy)| (x + dx * radius, y + dy * radius)).collect();
+        self.marks.push(Mark::Polygon { points: points.clone(), colour: super::style::PAPER, alpha: 1.0 });
+        points.push(points[0]);
+        // The second corner again, so that the line's last joint is closed.
+        points.push(points[1]);
+        self.line(points, colour, 1.6, 1.0);
     }
 
     /// Text on the baseline `y`. Returns the box it covers.
@@ -220,6 +241,19 @@ impl Figure {
 
     pub fn part(&mut self, part: Part, r: Rect) {
         self.boxes.push((part, r));
+    }
+}
+
+/// Corners of a marker of radius 1.
+fn corners(shape: Shape) -> Vec<(f64, f64)> {
+    match shape {
+        Shape::Circle => (0..24).map(|i| (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos()).collect(),
+        Shape::Square => vec![(-0.85, -0.85), (0.85, -0.85), (0.85, 0.85), (-0.85, 0.85)],
+        Shape::Diamond => vec![(0.0, -1.2), (1.2, 0.0), (0.0, 1.2), (-1.2, 0.0)],
+        Shape::Up => vec![(0.0, -1.15), (1.1, 0.8), (-1.1, 0.8)],
+        Shape::Down => vec![(0.0, 1.15), (1.1, -0.8), (-1.1, -0.8)],
+        Shape::Cross => cross(0.0).to_vec(),
+        Shape::Times => cross(std::f64::consts::FRAC_PI_4).to_vec(),
     }
 }
 

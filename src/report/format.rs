@@ -54,8 +54,11 @@ pub fn grouped(plain: &str) -> String {
     out
 }
 
-/// Short tick labels: `0.5`, `20`, `1.5k`, `2M`.
+/// Short tick labels: `0.5`, `20`, `1.5k`, `2M`, `1e−8`.
 pub fn tick(x: f64) -> String {
+    if x != 0.0 && x.abs() < 1e-3 {
+        return format!("{x:e}").replace('-', "−");
+    }
     let (scaled, suffix) = match x.abs() {
         a if a >= 1e9 => (x / 1e9, "G"),
         a if a >= 1e6 => (x / 1e6, "M"),
@@ -197,7 +200,9 @@ mod tests {
 
     #[test]
     fn ticks_are_short_and_exact() {
-        for (x, expected) in [(0.001, "0.001"), (5000.0, "5000"), (15000.0, "15k"), (2.5e6, "2.5M"), (-0.5, "−0.5")] {
+        for (x, expected) in
+            [(0.001, "0.001"), (5000.0, "5000"), (15000.0, "15k"), (2.5e6, "2.5M"), (-0.5, "−0.5"), (2e-8, "2e−8")]
+        {
             assert_eq!(tick(x), expected);
         }
     }

@@ -20,6 +20,8 @@ pub mod findings;
 pub mod font;
 pub mod forest;
 pub mod format;
+pub mod frontier;
+pub mod frontier_table;
 pub mod labels;
 pub mod metrics;
 mod own_value;
@@ -27,16 +29,21 @@ pub mod page;
 pub mod pareto;
 pub mod query;
 pub mod render;
+pub mod repeatability;
+pub mod repeatability_tables;
 pub mod rows;
 pub mod scale;
 pub mod scatter;
 pub mod style;
+pub mod sweep_chart;
+pub mod sweep_tables;
+pub mod sweeps;
 pub mod table;
 pub mod tables;
 
 use crate::claim::Claim;
 use crate::error::{Error, Result};
-use crate::results::StudyResults;
+use crate::results::{Measured, StudyResults};
 use std::path::{Path, PathBuf};
 
 /// What [`write`] wrote.
@@ -52,21 +59,45 @@ pub struct Files {
 /// # Errors
 /// When a file cannot be written; names it.
 pub fn write(results: &StudyResults, claims: &[Claim], out_dir: &Path) -> Result<Files> {
+    write_with_series(results, claims, &[], out_dir)
+}
+
+/// As [`write`], with what all measurements of the study say together.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_with_series(
+    results: &StudyResults,
+    claims: &[Claim],
+    series: &[Measured],
+    out_dir: &Path,
+) -> Result<Files> {
     let grid = labels::Grid::of(results);
     let judged = claims::judge_all(results, claims);
-    let figures = charts::all(&grid, &judged);
-    let tables = vec![
+    let mut figures = charts::all(&grid, &judged);
+    let sweeps: Vec<_> = results.sweeps.iter().map(|s| sweeps::chart(results, s)).collect();
+    figures.extend(sweeps.iter().flatten().map(sweep_chart::draw));
+    let again = (series.len() > 1).then(|| repeatability::of(series));
+    let mut tables = vec![
         findings::best_table(&grid),
         tables::times(&grid),
         tables::memory(&grid),
         tables::build(&grid),
         tables::scenes(results),
+        frontier_table::report(&grid),
         tables::errors(&grid),
         tables::problems(&grid),
         tables::excluded(results),
         tables::claims(&judged),
         tables::environments(results),
     ];
+    for chart in sweeps.iter().flatten() {
+        tables.extend([sweep_tables::points(chart), sweep_tables::slopes(chart)]);
+    }
+    if let Some(again) = &again {
+        use repeatability_tables::{agreements, differences, readings};
+        tables.extend([agreements(again), differences(again), readings(again)]);
+    }
     let mut files = Files { page: out_dir.join("index.html"), charts: Vec::new(), tables: Vec::new() };
     let mut inline = Vec::new();
     for figure in &figures {
@@ -87,6 +118,8 @@ pub fn write(results: &StudyResults, claims: &[Claim], out_dir: &Path) -> Result
         figures: &figures,
         svgs: &inline,
         tables: &tables,
+        sweeps: &sweeps,
+        again: again.as_ref(),
     });
     save(&files.page, page.as_bytes())?;
     Ok(files)

@@ -7,7 +7,9 @@ use super::findings::findings;
 use super::font;
 use super::format::{capital, count, html};
 use super::labels::Grid;
+use super::repeatability::Repeatability;
 use super::style::DARK;
+use super::sweeps::Chart;
 use super::table::{Table, status_word};
 use crate::results::{RunStatus, StudyResults};
 use base64::Engine;
@@ -20,6 +22,10 @@ pub struct Content<'a> {
     /// The figures as SVG without background, in the same order.
     pub svgs: &'a [String],
     pub tables: &'a [Table],
+    /// Charts of errors against stressors, or why there is none.
+    pub sweeps: &'a [Result<Chart<'a>, String>],
+    /// What several measurements of the study say together.
+    pub again: Option<&'a Repeatability<'a>>,
 }
 
 fn style_sheet() -> String {
@@ -67,12 +73,23 @@ pub fn document(content: &Content) -> String {
     }
     let time = ["total-time-modelled", "total-time", "time-per-frame", "triangles-per-frame"];
     out += &section("times-section", "Time and work", &(figures(content, &time) + &table(content, "times")));
-    let error = ["time-against-error-modelled", "time-against-error", "time-against-over-submission"];
-    out += &section("errors-section", "Errors", &(figures(content, &error) + &table(content, "errors")));
+    let front = ["time-against-error-modelled", "time-against-error", "time-against-over-submission"];
+    let body = figures(content, &front);
+    if !body.is_empty() {
+        let body = format!("<p>{FRONTIER}</p>\n{body}{}", table(content, "frontier"));
+        out += &section("frontier-section", "Run time against error", &body);
+    }
+    out += &section("errors-section", "Errors", &table(content, "errors"));
+    if !content.sweeps.is_empty() {
+        out += &section("sweeps-section", "Errors against stressors", &sweeps_html(content));
+    }
     let body = figures(content, &["memory"]) + &table(content, "memory");
     out += &section("memory-section", "Memory", &body);
     let body = figures(content, &["build-time"]) + &table(content, "build") + &table(content, "scenes");
     out += &section("build-section", "Structures", &body);
+    if let Some(again) = content.again {
+        out += &section("repeatability-section", "Measured again", &again_html(content, again));
+    }
     out += &section("methods", "Methods", &methods(content));
     out += "</main>\n<footer><p>Written by cullmark. Charts as SVG and PNG are in <code>charts/</code>, tables as CSV, \
             Markdown and LaTeX in <code>tables/</code>. Type: Inter, SIL Open Font License 1.1.</p></footer>\n</body>\n</html>\n";
@@ -120,11 +137,17 @@ fn header(content: &Content) -> String {
     }
     links.extend([
         ("times-section", "Time and work"),
+        ("frontier-section", "Time against error"),
         ("errors-section", "Errors"),
-        ("memory-section", "Memory"),
-        ("build-section", "Structures"),
-        ("methods", "Methods"),
     ]);
+    if !content.sweeps.is_empty() {
+        links.push(("sweeps-section", "Stressors"));
+    }
+    links.extend([("memory-section", "Memory"), ("build-section", "Structures")]);
+    if content.again.is_some() {
+        links.push(("repeatability-section", "Measured again"));
+    }
+    links.push(("methods", "Methods"));
     for (id, name) in links {
         let _ = write!(out, "<li><a href=\"#{id}\">{name}</a></li>");
     }
@@ -142,6 +165,50 @@ fn what_was_run(grid: &Grid) -> String {
         count(grid.combinations.len() as u64, "combination", "combinations"),
         charts::basis(grid),
     )
+}
+
+const FRONTIER: &str = "Speed is worth what it costs in error. Each point is one run; the lower left corner is where \
+    everybody wants to be. On the front is what no other run of the scene beats in both coordinates; what lies behind it by \
+    less than the intervals can tell is hollow, not faded. Methods that must not lose visible triangles stand at zero or are \
+    not drawn at all: there, an error is a bug and no point. The pointer on a point names its run, which the table below lists.";
+
+const SWEEPS: &str = "What a method loses as one thing gets harder and all else stays. Both axes are logarithmic where the \
+    manifest asks for it, so that a power law is a straight line; exact zeros stand in a bin of their own, since a logarithm has \
+    no place for them. The dashed line is the growth that theory expects, and the table gives the growth that was measured.";
+
+fn sweeps_html(content: &Content) -> String {
+    let mut out = format!("<p>{SWEEPS}</p>\n");
+    for chart in content.sweeps {
+        match chart {
+            Ok(chart) => {
+                let id = format!("sweep-{}", chart.sweep.id);
+                out += &figures(content, &[&id]);
+                out += &table(content, &format!("{id}-growth"));
+                let points = table(content, &id);
+                let _ = writeln!(out, "<details><summary>The numbers</summary>\n{points}</details>");
+            }
+            Err(why) => {
+                let _ = writeln!(out, "<p class=\"note\">Not drawn: {}</p>", html(why));
+            }
+        }
+    }
+    out
+}
+
+fn again_html(content: &Content, again: &Repeatability) -> String {
+    let mut out = String::from(
+        "<p>The same study, measured more than once on purpose. Times should come again within their intervals; what is \
+         counted, and what is submitted, must come again to the last triangle.</p>\n<ul class=\"findings\">\n",
+    );
+    for finding in again.findings() {
+        let _ = writeln!(out, "<li>{}</li>", html(&finding));
+    }
+    out += "</ul>\n";
+    out += &table(content, "repeatability-differences");
+    out += &table(content, "repeatability");
+    let pairs = table(content, "repeatability-pairs");
+    let _ = writeln!(out, "<details><summary>Every number of every pair</summary>\n{pairs}</details>");
+    out
 }
 
 /// Below this a bootstrap over trials has too few values to draw from.

@@ -81,9 +81,11 @@ fn compare(a: &Cell, b: &Cell, descending: bool) -> Ordering {
 /// How a table is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
+    #[value(alias = "text")]
     Table,
     Json,
     Csv,
+    #[value(alias = "md")]
     Markdown,
     Latex,
 }

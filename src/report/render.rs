@@ -19,14 +19,39 @@ const PNG_SAMPLES: usize = 2;
 /// The SVG text. `paper` paints the background, for files that stand alone.
 pub fn svg(figure: &Figure, paper: bool) -> Result<String> {
     font::register();
+    let mut body = String::new();
+    if paper {
+        body += &layer(figure, &[], true)?;
+    }
+    let mut at = 0;
+    for tag in &figure.tags {
+        let (start, end) = (tag.marks.start, tag.marks.end);
+        body += &layer(figure, &figure.marks[at..start], false)?;
+        let data: Vec<String> = tag.data.iter().map(|(k, v)| format!(" data-{k}=\"{}\"", html(v))).collect();
+        body += &format!("<g{}>\n<title>{}</title>\n", data.concat(), html(&tag.title));
+        body += &layer(figure, &figure.marks[start..end], false)?;
+        body += "</g>\n";
+        at = end;
+    }
+    body += &layer(figure, &figure.marks[at..], false)?;
+    Ok(finish_svg(&body, figure))
+}
+
+/// Some marks as SVG elements, without the document around them.
+fn layer(figure: &Figure, marks: &[Mark], paper: bool) -> Result<String> {
+    if marks.is_empty() && !paper {
+        return Ok(String::new());
+    }
     let size = |x: f64| (x * SVG_FINE).round() as u32;
     let mut out = String::new();
     {
         let root = SVGBackend::with_string(&mut out, (size(figure.width), size(figure.height))).into_drawing_area();
         // plotters writes the em as size / 1.24 whatever the font is.
-        draw(figure, &root, SVG_FINE, 1.24, Baseline::AtAnchor, paper)?;
+        draw((&figure.id, marks), &root, SVG_FINE, 1.24, Baseline::AtAnchor, paper)?;
     }
-    Ok(finish_svg(&out, figure))
+    let start = out.find('>').map_or(0, |i| i + 1);
+    let end = out.rfind("</svg>").unwrap_or(out.len());
+    Ok(out[start..end].trim_start_matches('\n').to_string())
 }
 
 /// A marker to stand before a name in the text of a page.
@@ -46,12 +71,11 @@ pub fn swatch(look: Look) -> String {
 /// Gives the document its real size, a title and a description for screen
 /// readers, the font stack, and text on its baseline.
 fn finish_svg(raw: &str, figure: &Figure) -> String {
-    let open_end = raw.find('>').map_or(0, |i| i + 1);
     let (w, h) = (figure.width, figure.height);
     let id = &figure.id;
     let head = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {} {}\" role=\"img\" \
-         aria-labelledby=\"{id}-title {id}-desc\">\n<title id=\"{id}-title\">{}</title>\n<desc id=\"{id}-desc\">{}</desc>",
+         aria-labelledby=\"{id}-title {id}-desc\">\n<title id=\"{id}-title\">{}</title>\n<desc id=\"{id}-desc\">{}</desc>\n",
         w * SVG_FINE,
         h * SVG_FINE,
         html(&figure.title),
@@ -59,7 +83,7 @@ fn finish_svg(raw: &str, figure: &Figure) -> String {
     );
     // `dy` would move the baseline by font metrics of the reader's machine; and
     // plotters leaves a line end inside the text, which browsers draw as a space.
-    let body = raw[open_end..]
+    let body = raw
         .replace(" dy=\"-0.5ex\"", "")
         .replace(&format!("font-family=\"{}\"", font::FAMILY), &format!("font-family=\"{}\"", font::STACK))
         .replace("font-weight=\"bold\"", "font-weight=\"600\"")
@@ -68,7 +92,7 @@ fn finish_svg(raw: &str, figure: &Figure) -> String {
     if !body.ends_with('\n') {
         body.push('\n');
     }
-    head + &body
+    head + &body + "</svg>\n"
 }
 
 /// Removes the line end plotters writes after `<text ...>`.
@@ -100,7 +124,8 @@ pub fn png(figure: &Figure) -> Result<Vec<u8>> {
     {
         let size = ((w * PNG_SAMPLES) as u32, (h * PNG_SAMPLES) as u32);
         let root = BitMapBackend::with_buffer(&mut fine, size).into_drawing_area();
-        draw(figure, &root, scale as f64, font::HEIGHT_EM, Baseline::HalfSizeBelow, false)?;
+        let marks = (figure.id.as_str(), &figure.marks[..]);
+        draw(marks, &root, scale as f64, font::HEIGHT_EM, Baseline::HalfSizeBelow, false)?;
     }
     let pixels = average(&fine, w, h);
     let mut out = Vec::new();
@@ -149,19 +174,19 @@ fn rgba(c: Colour, alpha: f64) -> RGBAColor {
 type Area<'a, B> = DrawingArea<B, plotters::coord::Shift>;
 
 fn draw<B: DrawingBackend>(
-    figure: &Figure,
+    (id, marks): (&str, &[Mark]),
     root: &Area<'_, B>,
     scale: f64,
     height_em: f64,
     baseline: Baseline,
     paper: bool,
 ) -> Result<()> {
-    let bad = |e: DrawingAreaErrorKind<B::ErrorType>| Error::new(format!("cannot draw {}: {e}", figure.id));
+    let bad = |e: DrawingAreaErrorKind<B::ErrorType>| Error::new(format!("cannot draw {id}: {e}"));
     let at = |p: &(f64, f64)| ((p.0 * scale).round() as i32, (p.1 * scale).round() as i32);
     if paper {
         root.fill(&rgba(PAPER, 1.0)).map_err(bad)?;
     }
-    for mark in &figure.marks {
+    for mark in marks {
         match mark {
             Mark::Line { points, colour, width, alpha } => {
                 let stroke = rgba(*colour, *alpha).stroke_width((width * scale).round().max(1.0) as u32);

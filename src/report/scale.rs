@@ -6,9 +6,12 @@ use super::format;
 pub enum Kind {
     Linear,
     Log,
-    /// Logarithmic, with a bin of its own for zero, so many pixels wide.
+    /// Logarithmic, with a bin of its own for zero: so many pixels, [`BREAK`] included.
     LogZero(f64),
 }
+
+/// Pixels between the bin of zeros and the logarithmic axis: the axis is broken there.
+pub const BREAK: f64 = 9.0;
 
 /// Maps `low..high` onto the pixels `from..to` (`from` may be the larger).
 #[derive(Debug, Clone, Copy)]
@@ -79,7 +82,7 @@ impl Scale {
         let forward = (self.to - self.from).signum();
         let (from, share) = match self.kind {
             Kind::Linear => (self.from, (value - self.low) / (self.high - self.low)),
-            Kind::LogZero(bin) if value <= 0.0 => return self.from + forward * bin / 2.0,
+            Kind::LogZero(bin) if value <= 0.0 => return self.from + forward * (bin - BREAK) / 2.0,
             Kind::Log => (self.from, (value / self.low).ln() / (self.high / self.low).ln()),
             Kind::LogZero(bin) => (self.from + forward * bin, (value / self.low).ln() / (self.high / self.low).ln()),
         };
@@ -160,7 +163,7 @@ mod tests {
     fn zero_has_its_own_bin_below_every_positive_value() {
         let mut scale = Scale::log([1.0, 100.0]).onto(200.0, 0.0);
         scale.kind = Kind::LogZero(30.0);
-        assert_eq!(scale.at(0.0), 185.0);
+        assert_eq!(scale.at(0.0), 189.5);
         assert!(scale.at(scale.low) <= 170.0 + 1e-9);
     }
 }

@@ -1,14 +1,17 @@
 //! Run time against error, one panel a scene, with the Pareto front: what is
-//! dominated fades, what is on the front is joined and named.
+//! dominated fades, what the trials cannot tell from the front is hollow, what is
+//! on the front is full, joined and named. Every point carries its run.
 
 use super::facets::{self, SMALL, Sample};
 use super::figure::{Anchor, Figure, Part, Rect, TextStyle, plain, text_box};
+use super::format;
+use super::frontier::{Front, Point, Standing, fronts, over_submission};
+use super::frontier_table::tagged;
 use super::labels::Grid;
-use super::pareto;
+use super::metrics::Metric;
 use super::rows;
-use super::scale::{Kind, Scale};
+use super::scale::{BREAK, Kind, Scale};
 use super::style::{ALARM, FRAME, INK, MUTED, SHADE};
-use crate::results::{RunResult, RunStatus};
 
 pub struct Scatter<'a> {
     pub id: &'a str,
@@ -18,117 +21,203 @@ pub struct Scatter<'a> {
     pub y_axis: &'a str,
     /// Give zero a bin of its own below the logarithmic axis.
     pub zero_bin: bool,
-    pub point: &'a dyn Fn(&RunResult) -> Option<(f64, f64)>,
+    pub x: &'a Metric,
+    pub y: &'a Metric,
 }
 
-struct Dot {
-    combination: usize,
-    data: (f64, f64),
-    /// "† 120 ppm" when its class may lose triangles.
-    price: Option<String>,
+/// A point with its place on the figure.
+struct Dot<'a> {
+    point: &'a Point<'a>,
     at: (f64, f64),
-    on_front: bool,
 }
 
 pub fn draw(grid: &Grid, what: &Scatter) -> Figure {
+    let all = fronts(grid, what.x, what.y, &|_| true);
     let columns = grid.places.len().clamp(1, 2);
     let rows = grid.places.len().div_ceil(columns);
-    let (w, h) = if columns == 1 { (840.0, 320.0) } else { (404.0, 236.0) };
+    let (w, h) = if columns == 1 { (840.0, 340.0) } else { (404.0, 256.0) };
     let (left, gap) = (74.0, (84.0, 78.0));
     let width = left + columns as f64 * w + (columns as f64 - 1.0) * gap.0 + 28.0;
-    let top = 58.0 + facets::legend_height(&grid.legend, width - 32.0, Sample::Marker) + 26.0;
+    let inner = width - 32.0;
+    let top = 58.0 + facets::legend_height(&grid.legend, inner, Sample::Marker) + 18.0 + 26.0;
     let height = top + rows as f64 * h + (rows as f64 - 1.0) * gap.1 + 46.0;
     let mut figure = Figure::new(what.id, what.title, width, height);
     facets::title(&mut figure, what.title, what.sub);
-    facets::legend(&mut figure, &grid.legend, 16.0, 58.0, width - 32.0, Sample::Marker);
+    facets::legend(&mut figure, &grid.legend, 16.0, 58.0, inner, Sample::Marker);
+    standings_legend(&mut figure, top - 34.0);
     let mut words = format!("{}. {} against {}. ", what.title, what.y_axis, what.x_axis);
-
-    for (i, plot) in facets::panels(grid.places.len(), columns, left, top, (w, h), gap).into_iter().enumerate() {
+    for (front, plot) in all.iter().zip(facets::panels(all.len(), columns, left, top, (w, h), gap)) {
         figure.part(Part::Plot, plot);
-        let dots = panel(&mut figure, grid, what, i, plot);
-        let front: Vec<&str> =
-            dots.iter().filter(|d| d.on_front).map(|d| grid.combinations[d.combination].as_str()).collect();
-        words += &format!("{}: on the front {}. ", grid.places[i], front.join(", "));
+        panel(&mut figure, grid, what, front, plot);
+        let names: Vec<&str> = front.on_front().map(|p| grid.combinations[p.combination].as_str()).collect();
+        words += &format!("{}: on the front {}. ", front.place, names.join(", "));
     }
     figure.description = words.trim_end().to_string();
     figure
 }
 
-fn panel(figure: &mut Figure, grid: &Grid, what: &Scatter, place: usize, plot: Rect) -> Vec<Dot> {
-    let mut dots: Vec<Dot> = grid.cells[place]
-        .iter()
-        .enumerate()
-        .filter_map(|(combination, cell)| {
-            let run = cell.filter(|r| r.status == RunStatus::Done)?;
-            let data = (what.point)(run)?;
-            Some(Dot { combination, data, price: rows::price(run), at: (0.0, 0.0), on_front: false })
-        })
-        .collect();
-    let zeros = dots.iter().filter(|d| d.data.1 <= 0.0).count();
-    let gaps = grid.cells[place].iter().flatten().filter(|r| r.status != RunStatus::Done).count();
-    let mut notes = Vec::new();
-    if what.zero_bin && zeros == dots.len() && zeros > 0 {
-        notes.push(format!("none of the {zeros} lost a sampled pixel: only time differs"));
-    } else if what.zero_bin && zeros > 0 {
-        notes.push(format!("{zeros} of {} lost no sampled pixel", dots.len()));
+/// What full, hollow and faded mean.
+fn standings_legend(figure: &mut Figure, y: f64) {
+    let mut x = 16.0;
+    let r = figure.label(x, y, "standing", plain(SMALL, MUTED));
+    x = r.right() + 10.0;
+    for (standing, words) in [
+        (Standing::Front, "on the front"),
+        (Standing::Noise, "within noise of the front"),
+        (Standing::Dominated, "dominated beyond the intervals"),
+    ] {
+        mark(
+            figure,
+            (x + 6.0, y - 3.6),
+            standing,
+            super::style::Look { colour: INK, shape: super::style::Shape::Circle, dash: &[] },
+        );
+        let r = figure.label(x + 17.0, y, words, plain(facets::BODY, INK));
+        x = r.right() + 20.0;
     }
-    if gaps > 0 {
-        notes.push(format!("{gaps} without a usable run"));
-    }
-    facets::panel_head(figure, plot, &grid.places[place], &notes.join("; "));
+}
 
-    let xs: Vec<f64> = dots.iter().map(|d| d.data.0).collect();
-    let ys: Vec<f64> = dots.iter().map(|d| d.data.1).collect();
+fn mark(figure: &mut Figure, (x, y): (f64, f64), standing: Standing, look: super::style::Look) {
+    match standing {
+        Standing::Front | Standing::Contested => figure.marker(x, y, 5.0, look.shape, look.colour, 1.0),
+        Standing::Noise => figure.hollow(x, y, 4.6, look.shape, look.colour),
+        Standing::Dominated => figure.marker(x, y, 4.2, look.shape, look.colour, FADED),
+    }
+}
+
+const FADED: f64 = 0.38;
+
+/// The lower end of the bar of a point: over-submission has one where it is bracketed.
+fn at_least(what: &Scatter, p: &Point) -> Option<f64> {
+    if what.y.name == "over_submission" { over_submission(p.run)?.0 } else { None }
+}
+
+fn panel(figure: &mut Figure, grid: &Grid, what: &Scatter, front: &Front, plot: Rect) {
+    let ys: Vec<f64> = front.points.iter().map(|p| p.y.0).collect();
+    let zeros = ys.iter().filter(|y| **y <= 0.0).count();
+    facets::panel_head(figure, plot, &front.place, &notes(what, front, zeros));
+
+    let xs: Vec<f64> = front.points.iter().flat_map(|p| [p.x.0, p.x.1, p.x.2]).collect();
     // Air at both ends, or markers and labels would leave the panel.
     let x = Scale::fitting(&xs);
     let inset = if x.is_log() { 14.0 } else { 0.0 };
     let x = x.onto(plot.x + inset, plot.right() - 14.0);
+    let all_zero = what.zero_bin && zeros == ys.len();
     let y = if what.zero_bin {
         // Room for names above and below the points at zero.
         let bin = match zeros {
-            0 => 22.0,
-            n if n == ys.len() => plot.h,
-            _ => 64.0,
+            0 => 26.0 + BREAK,
+            _ if all_zero => plot.h + BREAK,
+            _ => 74.0 + BREAK,
         };
         let mut y = Scale::log(ys.iter().copied()).onto(plot.bottom(), plot.y);
         y.kind = Kind::LogZero(bin);
-        zero_bin(figure, plot, bin, zeros == ys.len());
         y
     } else {
-        Scale::fitting(&ys).onto(plot.bottom(), plot.y + 8.0)
+        let low: Vec<f64> = front.points.iter().filter_map(|p| at_least(what, p)).collect();
+        Scale::fitting(&[&ys[..], &low].concat()).onto(plot.bottom(), plot.y + 8.0)
     };
-    if !(what.zero_bin && zeros == ys.len()) {
+    if !all_zero {
         facets::y_axis(figure, plot, &y, 4);
+    }
+    if let Kind::LogZero(bin) = y.kind {
+        zero_bin(figure, plot, bin - BREAK, all_zero);
     }
     facets::x_axis(figure, plot, &x, 6, true);
     facets::x_title(figure, plot, what.x_axis);
     facets::y_title(figure, plot, what.y_axis, 50.0);
 
-    let front = pareto::front(&dots.iter().map(|d| d.data).collect::<Vec<_>>());
-    for (i, dot) in dots.iter_mut().enumerate() {
-        dot.at = (x.at(dot.data.0), y.at(dot.data.1));
-        dot.on_front = front.contains(&i);
+    let mut dots: Vec<Dot> =
+        front.points.iter().map(|point| Dot { point, at: (x.at(point.x.0), y.at(point.y.0)) }).collect();
+    if let Kind::LogZero(bin) = y.kind {
+        spread_zeros(&mut dots, (bin - BREAK) / 2.0 - 9.0);
     }
-    let stairs = staircase(&front.iter().map(|i| dots[*i].at).collect::<Vec<_>>(), plot);
+    let on: Vec<(f64, f64)> = dots.iter().filter(|d| d.point.standing.on_front()).map(|d| d.at).collect();
+    let stairs = staircase(&on, plot);
     figure.dashed(&stairs, MUTED, 1.1, 0.9, &[4.0, 3.0]);
-    for on_front in [false, true] {
-        for dot in dots.iter().filter(|d| d.on_front == on_front) {
-            let look = grid.legend.entries[dot.combination].look;
-            let (radius, alpha) = if on_front { (5.0, 1.0) } else { (4.2, 0.45) };
-            figure.marker(dot.at.0, dot.at.1, radius, look.shape, look.colour, alpha);
+    // What matters comes last and lies on top.
+    for wanted in [Standing::Dominated, Standing::Noise, Standing::Contested, Standing::Front] {
+        for dot in dots.iter().filter(|d| d.point.standing == wanted) {
+            let p = dot.point;
+            let low = at_least(what, p);
+            tagged(figure, grid, p, describe(what, p, low), |figure| {
+                let look = grid.legend.entries[p.combination].look;
+                let alpha = if wanted == Standing::Dominated { FADED } else { 0.9 };
+                let (x0, x1) = (x.at(p.x.1), x.at(p.x.2));
+                if x1 - x0 > 1.0 {
+                    figure.line(vec![(x0, dot.at.1), (x1, dot.at.1)], look.colour, 1.4, alpha);
+                }
+                if let Some(low) = low {
+                    let y0 = y.at(low);
+                    figure.line(vec![(dot.at.0, y0), dot.at], look.colour, 1.4, alpha);
+                    figure.line(vec![(dot.at.0 - 3.0, y0), (dot.at.0 + 3.0, y0)], look.colour, 1.4, alpha);
+                }
+                mark(figure, dot.at, wanted, look);
+            });
         }
     }
     name_front(figure, grid, &dots, &stairs, plot);
-    dots
 }
 
+/// What stands beside the name of the scene.
+fn notes(what: &Scatter, front: &Front, zeros: usize) -> String {
+    let mut notes = Vec::new();
+    let n = front.points.len();
+    if what.zero_bin && zeros == n && zeros > 0 {
+        notes.push(format!("none of {n} lost a sampled pixel"));
+    } else if what.zero_bin && zeros > 0 {
+        notes.push(format!("{zeros} of {n} lost no sampled pixel"));
+    }
+    let without = front.gaps.iter().filter(|g| g.run.culling != super::style::IDLE).count();
+    if without > 0 {
+        notes.push(format!("{without} without a point"));
+    }
+    notes.join("; ")
+}
+
+/// "12.3 µs [12.1, 12.6], 140 px/M, dominated".
+fn describe(what: &Scatter, p: &Point, low: Option<f64>) -> String {
+    let unit = |m: &Metric| if m.unit.is_empty() { String::new() } else { format!(" {}", m.unit) };
+    let bracket = low.map_or_else(String::new, |low| format!(" (at least {})", format::number(low, 3)));
+    format!(
+        "{}{} {}, {}{} {}{bracket}; {}; measurement {}",
+        format::interval(p.x.0, p.x.1, p.x.2),
+        unit(what.x),
+        what.x.name,
+        format::number(p.y.0, 3),
+        unit(what.y),
+        what.y.name,
+        p.standing.word(),
+        p.run.measurement_id
+    )
+}
+
+/// Points at zero that would lie on each other are set apart upward and downward:
+/// in the bin of zeros height says nothing.
+fn spread_zeros(dots: &mut [Dot], room: f64) {
+    let mut order: Vec<usize> = (0..dots.len()).filter(|i| dots[*i].point.y.0 <= 0.0).collect();
+    order.sort_by_key(|i| (!dots[*i].point.standing.on_front(), *i));
+    let lanes = (room / 11.0).max(0.0) as i32;
+    let offsets = || std::iter::once(0).chain((1..=lanes).flat_map(|n| [n, -n])).map(|n| 11.0 * f64::from(n));
+    let mut placed: Vec<(f64, f64)> = Vec::new();
+    for i in order {
+        let x = dots[i].at.0;
+        let free = |dy: &f64| !placed.iter().any(|(px, pdy)| pdy == dy && (px - x).abs() < 11.0);
+        let dy = offsets().find(free).unwrap_or(0.0);
+        placed.push((x, dy));
+        dots[i].at.1 += dy;
+    }
+}
+
+/// The bin of exact zeros, drawn apart: the axis is broken between it and the rest.
 fn zero_bin(figure: &mut Figure, plot: Rect, bin: f64, alone: bool) {
     let y = plot.bottom() - bin;
     figure.rect(Rect::new(plot.x, y, plot.w, bin), SHADE, 0.8);
-    if !alone {
-        figure.segment((plot.x, y), (plot.right(), y), FRAME, 1.0);
-    }
     figure.label(plot.x - 7.0, plot.bottom() - bin / 2.0 + 3.6, "0", plain(SMALL, MUTED).end());
+    if alone {
+        return;
+    }
+    facets::axis_break(figure, plot, y - BREAK / 2.0);
 }
 
 /// The border of what is attainable: from each point of the front right, then down.
@@ -146,17 +235,18 @@ fn staircase(front: &[(f64, f64)], plot: Rect) -> Vec<(f64, f64)> {
 /// Names of the dots on the front, clear of dots, of the front's line and of
 /// each other, with the price of those that may lose triangles. The legend
 /// names everything else.
-fn name_front(figure: &mut Figure, grid: &Grid, dots: &[Dot], stairs: &[(f64, f64)], plot: Rect) {
+fn name_front(figure: &mut Figure, grid: &Grid, dots: &[Dot<'_>], stairs: &[(f64, f64)], plot: Rect) {
+    // Marks of points keep clear, and so do the lines of the front.
     let mut taken: Vec<Rect> = dots.iter().map(|d| Rect::new(d.at.0 - 5.0, d.at.1 - 5.0, 10.0, 10.0)).collect();
     taken.extend(stairs.windows(2).map(|s| {
         let (x, y) = (s[0].0.min(s[1].0), s[0].1.min(s[1].1));
         Rect::new(x - 1.0, y - 1.0, (s[1].0 - s[0].0).abs() + 2.0, (s[1].1 - s[0].1).abs() + 2.0)
     }));
-    let mut order: Vec<&Dot> = dots.iter().filter(|d| d.on_front).collect();
-    order.sort_by(|a, b| a.at.0.total_cmp(&b.at.0).then(a.combination.cmp(&b.combination)));
+    let mut order: Vec<&Dot> = dots.iter().filter(|d| d.point.standing.on_front()).collect();
+    order.sort_by(|a, b| a.at.0.total_cmp(&b.at.0).then(a.point.combination.cmp(&b.point.combination)));
     for dot in order {
-        let name = &grid.combinations[dot.combination];
-        let (text, colour) = match &dot.price {
+        let name = &grid.combinations[dot.point.combination];
+        let (text, colour) = match &rows::price(dot.point.run) {
             Some(price) => (format!("{name} {price}"), ALARM),
             None => (name.clone(), INK),
         };

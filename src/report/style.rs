@@ -123,6 +123,14 @@ impl Legend {
         legend
     }
 
+    /// An entry with a look of its own, for what is no combination.
+    pub fn add(&mut self, label: &str) {
+        if !self.entries.iter().any(|e| e.label == label) {
+            let look = Look::nth(self.entries.len());
+            self.entries.push(Entry { label: label.into(), look, variant: 0 });
+        }
+    }
+
     /// Grey for whoever culls nothing, the palette for the rest in order.
     pub fn culling_colour(&self, culling: &str) -> Colour {
         if culling == IDLE {

@@ -36,6 +36,11 @@ impl Column {
         Column { numeric: false, ..column(name, "", "") }
     }
 
+    pub fn named(mut self, name: &str) -> Column {
+        self.name = name.into();
+        self
+    }
+
     pub fn with_interval(mut self) -> Column {
         self.interval = true;
         self

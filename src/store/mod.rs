@@ -22,6 +22,7 @@ mod owner;
 pub mod queue;
 pub mod read;
 mod rows;
+mod series;
 pub mod settle;
 pub mod submit;
 
@@ -32,6 +33,7 @@ use std::time::Duration;
 
 pub use queue::{Accepted, Job, Kind, Lease, Left, Outcome};
 pub use read::{Detail, StudyInfo};
+pub use series::read_series;
 pub use settle::Settled;
 pub use submit::{Cell, Submission, Submitted};
 

@@ -4,8 +4,14 @@
 mod axes;
 #[path = "report/fixture.rs"]
 mod fixture;
+#[path = "report/frontier.rs"]
+mod frontier;
 #[path = "report/own_values.rs"]
 mod own_values;
+#[path = "report/repeatability.rs"]
+mod repeatability;
+#[path = "report/sweeps.rs"]
+mod sweeps;
 #[path = "report/xml.rs"]
 mod xml;
 

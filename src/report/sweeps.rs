@@ -1,0 +1,272 @@
+//! An error against a stressor: which runs of a study stand on which line of a
+//! [`Sweep`], and how fast each line grows.
+//!
+//! Runs that differ in nothing but the stressor and the axis of the lines share a
+//! panel. Runs that agree even in those (other paths, say, or series) become one
+//! point: the median, from the smallest to the largest. What failed or is wrong for
+//! its class is no gap: its x is kept.
+
+use super::metrics::{self, Metric};
+use crate::math::Projection;
+use crate::record::{PathSource, RunSpec, SceneSource};
+use crate::registry::{Spec, Value, format_sum, parse_sum};
+use crate::results::{RunResult, RunStatus, StudyResults};
+use crate::stats;
+use crate::sweep::Sweep;
+
+/// A sweep with its runs in place.
+pub struct Chart<'a> {
+    pub sweep: &'a Sweep,
+    pub metric: &'static Metric,
+    pub panels: Vec<Panel<'a>>,
+}
+
+pub struct Panel<'a> {
+    /// Empty when there is one alone.
+    pub title: String,
+    pub lines: Vec<Line<'a>>,
+}
+
+pub struct Line<'a> {
+    /// Value of the axis [`Sweep::by`].
+    pub by: String,
+    /// By ascending x.
+    pub points: Vec<Point<'a>>,
+}
+
+pub struct Point<'a> {
+    pub x: f64,
+    /// Median over the runs that have one, smallest, largest; of one run its interval.
+    pub value: Option<(f64, f64, f64)>,
+    pub runs: Vec<&'a RunResult>,
+}
+
+impl Point<'_> {
+    pub fn with(&self, status: RunStatus) -> usize {
+        self.runs.iter().filter(|r| r.status == status).count()
+    }
+}
+
+/// Growth of a line on logarithmic axes: y ~ x^slope, by least squares over the
+/// points where both are above zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slope {
+    pub slope: f64,
+    /// Share of the variance that the straight line explains.
+    pub r2: f64,
+    pub points: usize,
+}
+
+/// Where the runs of a study stand on a chart.
+///
+/// # Errors
+/// In words for the page, when the sweep names what the study does not have.
+pub fn chart<'a>(results: &'a StudyResults, sweep: &'a Sweep) -> Result<Chart<'a>, String> {
+    let metric = metrics::get(&sweep.y).map_err(|e| e.to_string())?;
+    let mut panels: Vec<(Vec<(String, String)>, Panel)> = Vec::new();
+    for run in &results.runs {
+        let Some(x) = number(&run.spec, &sweep.x) else { continue };
+        let family = family(run, sweep);
+        let at = panels.iter().position(|(f, _)| *f == family).unwrap_or_else(|| {
+            panels.push((family, Panel { title: String::new(), lines: Vec::new() }));
+            panels.len() - 1
+        });
+        let lines = &mut panels[at].1.lines;
+        let by = by_value(run, &sweep.by);
+        let at = lines.iter().position(|l| l.by == by).unwrap_or_else(|| {
+            lines.push(Line { by, points: Vec::new() });
+            lines.len() - 1
+        });
+        let points = &mut lines[at].points;
+        match points.iter_mut().find(|p| p.x == x) {
+            Some(p) => p.runs.push(run),
+            None => points.push(Point { x, value: None, runs: vec![run] }),
+        }
+    }
+    if panels.is_empty() {
+        return Err(format!("no run has the number `{}` that the chart `{}` is to be drawn over", sweep.x, sweep.id));
+    }
+    let titles = titles(&panels.iter().map(|(f, _)| f).collect::<Vec<_>>());
+    let mut panels: Vec<Panel> = panels.into_iter().map(|(_, p)| p).collect();
+    for (panel, title) in panels.iter_mut().zip(titles) {
+        panel.title = title;
+        for line in &mut panel.lines {
+            line.points.sort_by(|a, b| a.x.total_cmp(&b.x));
+            line.points.iter_mut().for_each(|p| p.value = value(metric, &p.runs));
+        }
+    }
+    Ok(Chart { sweep, metric, panels })
+}
+
+/// A number that some axis of a run carries: `scene.offset_m`, `camera.fov_y_deg`.
+pub fn number(spec: &RunSpec, name: &str) -> Option<f64> {
+    let (part, key) = name.split_once('.')?;
+    let of = |s: &Spec| match s.params.get(key)? {
+        Value::Int(i) => Some(*i as f64),
+        Value::Float(x) => Some(*x),
+        _ => None,
+    };
+    match part {
+        "scene" => match &spec.scene.source {
+            _ if key == "scale" => Some(spec.scene.scale),
+            SceneSource::Generated(s) => of(s),
+            SceneSource::File(_) => None,
+        },
+        "path" => match &spec.path.source {
+            PathSource::Generated(s) => of(s),
+            PathSource::File(_) => None,
+        },
+        "camera" => match (key, spec.camera.projection) {
+            ("fov_y_deg", Projection::Perspective { fov_y_rad }) => Some(fov_y_rad.to_degrees()),
+            ("near_m", _) => Some(spec.camera.near_m),
+            ("far_m", _) => spec.camera.far_m,
+            _ => spec.axes.get(part).and_then(of),
+        },
+        "structure" => of(&spec.structure),
+        "culling" => spec.culling.iter().find_map(of),
+        "walk" => of(&spec.walk),
+        axis => spec.axes.get(axis).and_then(of),
+    }
+}
+
+/// The value of the axis whose values are the lines.
+fn by_value(run: &RunResult, by: &str) -> String {
+    match by {
+        "scene" => run.scene().to_string(),
+        "path" => run.spec.path.name.clone(),
+        "structure" => run.structure.clone(),
+        "culling" => run.culling.clone(),
+        "walk" => run.walk.clone(),
+        // A run that names none computes in the default.
+        crate::math::arithmetic::NAME => run.spec.arithmetic().map_or_else(|e| e.to_string(), |a| a.name().to_string()),
+        axis => run.spec.axes.get(axis).map_or_else(|| "default".into(), Spec::to_string),
+    }
+}
+
+/// All that sets the panel of a run apart, by axis: everything but the stressor and
+/// the axis of the lines.
+fn family(run: &RunResult, sweep: &Sweep) -> Vec<(String, String)> {
+    let (part, key) = sweep.x.split_once('.').unwrap_or((&sweep.x, ""));
+    let strip = |s: &Spec| {
+        let mut s = s.clone();
+        s.params.remove(key);
+        s.to_string()
+    };
+    // Short labels without defaults; parsed again where the stressor must go.
+    let label = |name: &str, text: &str| {
+        if part != name {
+            return text.to_string();
+        }
+        let parts = parse_sum(text).unwrap_or_default();
+        parts.iter().map(strip).collect::<Vec<_>>().join("+")
+    };
+    let s = &run.spec;
+    let scene = match &s.scene.source {
+        _ if part != "scene" => s.scene.name.clone(),
+        SceneSource::Generated(spec) => strip(spec),
+        SceneSource::File(path) => path.display().to_string(),
+    };
+    let path = match &s.path.source {
+        PathSource::Generated(spec) if part == "path" => strip(spec),
+        _ => s.path.name.clone(),
+    };
+    let mut camera = s.camera;
+    match (key, part) {
+        ("fov_y_deg", "camera") => camera.projection = Projection::Perspective { fov_y_rad: 0.0 },
+        ("near_m", "camera") => camera.near_m = 0.0,
+        ("far_m", "camera") => camera.far_m = None,
+        _ => {}
+    }
+    let mut out = vec![
+        ("scene".to_string(), scene),
+        ("path".into(), path),
+        ("camera".into(), serde_json::to_string(&camera).unwrap_or_default()),
+        ("structure".into(), label("structure", &run.structure)),
+        ("culling".into(), label("culling", &run.culling)),
+        ("walk".into(), label("walk", &run.walk)),
+    ];
+    // The camera of a run is resolved: its axis says the same again.
+    let axes = s.axes.iter().filter(|(axis, _)| *axis != "camera");
+    out.extend(axes.map(|(axis, spec)| {
+        (axis.clone(), if axis == part { strip(spec) } else { format_sum(std::slice::from_ref(spec)) })
+    }));
+    out.retain(|(axis, _)| *axis != sweep.by);
+    out
+}
+
+/// Of each panel what the others do not share.
+fn titles(families: &[&Vec<(String, String)>]) -> Vec<String> {
+    let varies = |axis: &str, value: &str| {
+        families.iter().any(|f| f.iter().find(|(a, _)| a == axis).is_none_or(|(_, v)| v != value))
+    };
+    let of = |f: &Vec<(String, String)>| {
+        let parts = f.iter().filter(|(axis, value)| varies(axis, value)).map(|(_, value)| value.as_str());
+        parts.collect::<Vec<_>>().join(" × ")
+    };
+    families.iter().map(|f| of(f)).collect()
+}
+
+fn value(metric: &Metric, runs: &[&RunResult]) -> Option<(f64, f64, f64)> {
+    // Wrong runs show their errors in tables; on a chart of growth they are marks of their own.
+    let done: Vec<&&RunResult> = runs.iter().filter(|r| r.status == RunStatus::Done).collect();
+    if let [run] = done[..] {
+        return metric.interval(run);
+    }
+    let values: Vec<f64> = done.iter().filter_map(|r| metric.value(r)).collect();
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    (!values.is_empty()).then(|| (stats::median(&values), low, high))
+}
+
+impl Line<'_> {
+    /// log10 of the points where both coordinates are above zero.
+    fn logs(&self) -> Vec<(f64, f64)> {
+        let points = self.points.iter().filter_map(|p| Some((p.x, p.value?.0)));
+        points.filter(|(x, y)| *x > 0.0 && *y > 0.0).map(|(x, y)| (x.log10(), y.log10())).collect()
+    }
+
+    pub fn slope(&self) -> Option<Slope> {
+        fit(&self.logs())
+    }
+
+    /// log10 of the factor c of a law y = c x^slope through the middle of the line.
+    pub fn anchor(&self, slope: f64) -> Option<f64> {
+        let found: Vec<f64> = self.logs().iter().map(|(x, y)| y - slope * x).collect();
+        (!found.is_empty()).then(|| stats::median(&found))
+    }
+
+    pub fn zeros(&self) -> usize {
+        self.points.iter().filter(|p| p.value.is_some_and(|v| v.0 <= 0.0)).count()
+    }
+}
+
+/// Least squares of y over x; `None` for fewer than two different x.
+fn fit(points: &[(f64, f64)]) -> Option<Slope> {
+    let (x, y): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
+    let (mx, my) = (stats::mean(&x), stats::mean(&y));
+    let xx: f64 = x.iter().map(|x| (x - mx).powi(2)).sum();
+    let xy: f64 = points.iter().map(|(x, y)| (x - mx) * (y - my)).sum();
+    let yy: f64 = y.iter().map(|y| (y - my).powi(2)).sum();
+    if points.len() < 2 || xx <= 0.0 {
+        return None;
+    }
+    // A line without any growth is explained wholly.
+    let r2 = if yy > 0.0 { xy * xy / (xx * yy) } else { 1.0 };
+    Some(Slope { slope: xy / xx, r2, points: points.len() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slope_of_a_power_law_is_its_exponent() {
+        for exponent in [-2.0, 0.0, 0.5, 1.0, 3.0] {
+            let points: Vec<(f64, f64)> = (0..9).map(|i| (f64::from(i), 0.7 + exponent * f64::from(i))).collect();
+            let found = fit(&points).unwrap();
+            assert!((found.slope - exponent).abs() < 1e-12 && (found.r2 - 1.0).abs() < 1e-12, "{found:?}");
+        }
+        assert_eq!(fit(&[(1.0, 2.0)]), None);
+        assert_eq!(fit(&[(1.0, 2.0), (1.0, 3.0)]), None, "one x has no slope");
+        assert_eq!(fit(&[]), None);
+    }
+}
