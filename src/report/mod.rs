@@ -26,6 +26,7 @@ pub mod labels;
 pub mod metrics;
 mod own_value;
 pub mod page;
+mod pairs;
 pub mod pareto;
 pub mod query;
 pub mod render;

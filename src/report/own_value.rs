@@ -1,7 +1,8 @@
 //! Claims about a metric itself: that it is 0 in every run, or has the published value.
 
-use super::claims::{Group, Ratio, Verdict, decide, group_name, stated};
+use super::claims::{Group, Ratio, Verdict, decide, stated};
 use super::metrics::{self, Kind, Metric};
+use super::pairs::group_name;
 use crate::claim::{Claim, Relation, selects};
 use crate::results::{RunResult, RunStatus, StudyResults};
 use crate::stats;

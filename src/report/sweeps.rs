@@ -8,8 +8,7 @@
 
 use super::metrics::{self, Metric};
 use crate::math::Projection;
-use crate::record::{PathSource, RunSpec, SceneSource};
-use crate::registry::{Spec, Value, format_sum, parse_sum};
+use crate::registry::{Spec, format_sum, parse_sum};
 use crate::results::{RunResult, RunStatus, StudyResults};
 use crate::stats;
 use crate::sweep::Sweep;
@@ -64,9 +63,10 @@ pub struct Slope {
 pub fn chart<'a>(results: &'a StudyResults, sweep: &'a Sweep) -> Result<Chart<'a>, String> {
     let metric = metrics::get(&sweep.y).map_err(|e| e.to_string())?;
     let mut panels: Vec<(Vec<(String, String)>, Panel)> = Vec::new();
+    let follows = camera_follows(results, &sweep.x);
     for run in &results.runs {
-        let Some(x) = number(&run.spec, &sweep.x) else { continue };
-        let family = family(run, sweep);
+        let Some(x) = run.spec.number(&sweep.x) else { continue };
+        let family = family(run, sweep, follows);
         let at = panels.iter().position(|(f, _)| *f == family).unwrap_or_else(|| {
             panels.push((family, Panel { title: String::new(), lines: Vec::new() }));
             panels.len() - 1
@@ -98,37 +98,6 @@ pub fn chart<'a>(results: &'a StudyResults, sweep: &'a Sweep) -> Result<Chart<'a
     Ok(Chart { sweep, metric, panels })
 }
 
-/// A number that some axis of a run carries: `scene.offset_m`, `camera.fov_y_deg`.
-pub fn number(spec: &RunSpec, name: &str) -> Option<f64> {
-    let (part, key) = name.split_once('.')?;
-    let of = |s: &Spec| match s.params.get(key)? {
-        Value::Int(i) => Some(*i as f64),
-        Value::Float(x) => Some(*x),
-        _ => None,
-    };
-    match part {
-        "scene" => match &spec.scene.source {
-            _ if key == "scale" => Some(spec.scene.scale),
-            SceneSource::Generated(s) => of(s),
-            SceneSource::File(_) => None,
-        },
-        "path" => match &spec.path.source {
-            PathSource::Generated(s) => of(s),
-            PathSource::File(_) => None,
-        },
-        "camera" => match (key, spec.camera.projection) {
-            ("fov_y_deg", Projection::Perspective { fov_y_rad }) => Some(fov_y_rad.to_degrees()),
-            ("near_m", _) => Some(spec.camera.near_m),
-            ("far_m", _) => spec.camera.far_m,
-            _ => spec.axes.get(part).and_then(of),
-        },
-        "structure" => of(&spec.structure),
-        "culling" => spec.culling.iter().find_map(of),
-        "walk" => of(&spec.walk),
-        axis => spec.axes.get(axis).and_then(of),
-    }
-}
-
 /// The value of the axis whose values are the lines.
 fn by_value(run: &RunResult, by: &str) -> String {
     match by {
@@ -144,8 +113,8 @@ fn by_value(run: &RunResult, by: &str) -> String {
 }
 
 /// All that sets the panel of a run apart, by axis: everything but the stressor and
-/// the axis of the lines.
-fn family(run: &RunResult, sweep: &Sweep) -> Vec<(String, String)> {
+/// the axis of the lines, and the camera where it `follows` the stressor.
+fn family(run: &RunResult, sweep: &Sweep, follows: bool) -> Vec<(String, String)> {
     let (part, key) = sweep.x.split_once('.').unwrap_or((&sweep.x, ""));
     let strip = |s: &Spec| {
         let mut s = s.clone();
@@ -161,14 +130,12 @@ fn family(run: &RunResult, sweep: &Sweep) -> Vec<(String, String)> {
         parts.iter().map(strip).collect::<Vec<_>>().join("+")
     };
     let s = &run.spec;
-    let scene = match &s.scene.source {
-        _ if part != "scene" => s.scene.name.clone(),
-        SceneSource::Generated(spec) => strip(spec),
-        SceneSource::File(path) => path.display().to_string(),
-    };
-    let path = match &s.path.source {
-        PathSource::Generated(spec) if part == "path" => strip(spec),
-        _ => s.path.name.clone(),
+    // A member of a family is named by the values that set it apart.
+    let name = |name: &str, axis: &str| {
+        let value = format!("{key}=");
+        let mut parts = name.split('@');
+        let first = parts.next().unwrap_or_default().to_string();
+        parts.filter(|p| part != axis || !p.starts_with(&value)).fold(first, |name, p| format!("{name}@{p}"))
     };
     let mut camera = s.camera;
     match (key, part) {
@@ -178,8 +145,8 @@ fn family(run: &RunResult, sweep: &Sweep) -> Vec<(String, String)> {
         _ => {}
     }
     let mut out = vec![
-        ("scene".to_string(), scene),
-        ("path".into(), path),
+        ("scene".to_string(), name(&s.scene.name, "scene")),
+        ("path".into(), name(&s.path.name, "path")),
         ("camera".into(), serde_json::to_string(&camera).unwrap_or_default()),
         ("structure".into(), label("structure", &run.structure)),
         ("culling".into(), label("culling", &run.culling)),
@@ -190,8 +157,22 @@ fn family(run: &RunResult, sweep: &Sweep) -> Vec<(String, String)> {
     out.extend(axes.map(|(axis, spec)| {
         (axis.clone(), if axis == part { strip(spec) } else { format_sum(std::slice::from_ref(spec)) })
     }));
-    out.retain(|(axis, _)| *axis != sweep.by);
+    out.retain(|(axis, _)| *axis != sweep.by && !(follows && axis == "camera"));
     out
+}
+
+/// Whether the camera is a function of the stressor, as where both advance together.
+fn camera_follows(results: &StudyResults, x: &str) -> bool {
+    let mut cameras: Vec<(f64, &crate::math::Camera)> = Vec::new();
+    for run in &results.runs {
+        let Some(x) = run.spec.number(x) else { continue };
+        match cameras.iter().find(|(at, _)| *at == x) {
+            Some((_, camera)) if **camera != run.spec.camera => return false,
+            Some(_) => {}
+            None => cameras.push((x, &run.spec.camera)),
+        }
+    }
+    true
 }
 
 /// Of each panel what the others do not share.

@@ -3,7 +3,7 @@
 use super::fixture;
 use cullmark::record::SceneSource;
 use cullmark::registry::{Spec, Value};
-use cullmark::report::sweeps::{chart, number};
+use cullmark::report::sweeps::chart;
 use cullmark::report::{self, render, sweep_chart, sweep_tables};
 use cullmark::results::{RunResult, RunStatus, StudyResults};
 use cullmark::sweep::Sweep;
@@ -159,12 +159,12 @@ fn what_cannot_be_drawn_is_said_on_the_page() {
 #[test]
 fn numbers_are_found_on_every_axis() {
     let run = fixture::run("nucleus", 1e4, "octree:depth=4", "frustum", 5, 1, 1);
-    assert_eq!(number(&run.spec, "structure.depth"), Some(4.0));
-    let fov = number(&run.spec, "camera.fov_y_deg").unwrap();
+    assert_eq!(run.spec.number("structure.depth"), Some(4.0));
+    let fov = run.spec.number("camera.fov_y_deg").unwrap();
     assert!((fov - 60.0).abs() < 1e-9);
-    assert_eq!(number(&run.spec, "camera.near_m"), Some(0.1));
+    assert_eq!(run.spec.number("camera.near_m"), Some(0.1));
     for name in ["camera.far_m", "scene.name", "path.angle_rad", "culling.cells", "depth", "nothing.at_all"] {
-        assert_eq!(number(&run.spec, name), None, "{name}");
+        assert_eq!(run.spec.number(name), None, "{name}");
     }
 }
 
