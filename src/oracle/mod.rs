@@ -16,7 +16,10 @@ pub mod footprint;
 pub mod image;
 pub mod item_buffer;
 pub mod judge;
+pub mod lanes;
+pub mod set_up;
 pub mod sets;
+pub mod tile;
 pub mod volume;
 
 pub use bits::BitSet;
