@@ -14,6 +14,12 @@ use crate::math::{DVec3, View};
 /// A linear function `x * c[0] + (y * c[1] + c[2])` of the image plane.
 pub type Linear = [f64; 3];
 
+/// Closed sample bounds x0, x1, y0, y1.
+pub type Bounds = [u32; 4];
+
+/// Rounding of a sample coordinate is far below a thousandth of a sample.
+pub(super) const BOUND_SLACK: f64 = 1e-3;
+
 /// Coordinates of sample columns and rows on the image plane, unit depth for
 /// perspective and metres for orthographic, and the clip range as depth keys.
 #[derive(Debug, Clone)]
@@ -21,9 +27,10 @@ pub struct Lens {
     pub grid: Grid,
     pub xs: Vec<f64>,
     pub ys: Vec<f64>,
-    perspective: bool,
-    near_m: f64,
-    step: [f64; 2],
+    pub(super) perspective: bool,
+    pub(super) near_m: f64,
+    /// Samples per unit of `xs` and `ys`.
+    pub(super) per_step: [f64; 2],
     /// Depth keys grow towards the eye: `1 / depth` for perspective, `-depth` for
     /// orthographic; both are linear on the image plane.
     pub key_near: f64,
@@ -36,21 +43,17 @@ impl Lens {
         let (columns, rows) = (grid.columns(), grid.rows());
         let perspective = view.is_perspective();
         let key = |depth_m: f64| if perspective { 1.0 / depth_m } else { -depth_m };
+        let step = [2.0 * view.half_width / f64::from(columns), 2.0 * view.half_height / f64::from(rows)];
         Lens {
             grid,
             xs: (0..columns).map(|i| centre(i, columns, view.half_width)).collect(),
             ys: (0..rows).map(|j| -centre(j, rows, view.half_height)).collect(),
             perspective,
             near_m: view.camera.near_m,
-            step: [2.0 * view.half_width / f64::from(columns), 2.0 * view.half_height / f64::from(rows)],
+            per_step: step.map(|s| 1.0 / s),
             key_near: key(view.camera.near_m),
             key_far: key(view.camera.far_m.unwrap_or(f64::INFINITY)),
         }
-    }
-
-    /// Distance of neighbouring columns.
-    pub fn step_x(&self) -> f64 {
-        self.step[0]
     }
 
     /// The ray of a sample as (origin, direction) in camera coordinates.
@@ -90,7 +93,7 @@ impl Lens {
 }
 
 /// Set up for one frame. Sample bounds are closed and may hold samples outside.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Footprint {
     /// Triangle + 1.
     pub id: u32,
@@ -112,7 +115,7 @@ pub struct Footprint {
 impl Footprint {
     /// `None` if no sample can lie inside. `p`: corners in camera coordinates.
     pub fn new(lens: &Lens, id: u32, occluder: bool, mut p: [DVec3; 3]) -> Option<Footprint> {
-        let (x0, x1, y0, y1) = sample_bounds(lens, &p)?;
+        let bounds = sample_bounds(lens, &p)?;
         let normal = (p[1] - p[0]).cross(p[2] - p[0]);
         // Twice the volume to the eye, or along z: its sign is the orientation.
         let mut scale = if lens.perspective { normal.dot(p[0]) } else { normal.z };
@@ -126,8 +129,6 @@ impl Footprint {
             return None;
         }
         let edges = lens.edges(&p);
-        let takes = |[cx, cy, c]: Linear| cx > 0.0 || cx == 0.0 && (cy < 0.0 || cy == 0.0 && c > 0.0);
-        let takes_edge = (0..3).fold(0, |bits, k| bits | u8::from(takes(edges[k])) << k);
         // Depth z where the plane meets the ray: normal . (z x, z y, z) = scale, or
         // normal . (x, y, z) = normal . p0.
         let key = match lens.perspective {
@@ -146,7 +147,49 @@ impl Footprint {
         if key_max < lens.key_far || key_min > lens.key_near {
             return None;
         }
-        Some(Footprint { id, occluder, edges, takes_edge, key, key_min, key_max, x0, x1, y0, y1 })
+        Some(Footprint::of(id, occluder, edges, key, [key_min, key_max], bounds))
+    }
+
+    #[inline(always)]
+    pub(super) fn of(
+        id: u32,
+        occluder: bool,
+        edges: [Linear; 3],
+        key: Linear,
+        [key_min, key_max]: [f64; 2],
+        [x0, x1, y0, y1]: Bounds,
+    ) -> Footprint {
+        let takes = |[cx, cy, c]: Linear| cx > 0.0 || cx == 0.0 && (cy < 0.0 || cy == 0.0 && c > 0.0);
+        let takes_edge = (0..3).fold(0, |bits, k| bits | u8::from(takes(edges[k])) << k);
+        Footprint { id, occluder, edges, takes_edge, key, key_min, key_max, x0, x1, y0, y1 }
+    }
+
+    /// Whether the sample at (x, y) of the image plane is inside.
+    #[inline]
+    pub fn inside(&self, [x, y]: [f64; 2]) -> bool {
+        (0..3).all(|k| self.inside_edge(k, x, y * self.edges[k][1] + self.edges[k][2]))
+    }
+
+    /// What an edge function must reach to be inside: nothing, or more than nothing.
+    #[inline]
+    pub fn threshold(&self, k: usize) -> f64 {
+        const ABOVE_ZERO: f64 = f64::from_bits(1);
+        if self.takes_edge >> k & 1 == 1 { 0.0 } else { ABOVE_ZERO }
+    }
+
+    /// The part of the key that does not depend on x.
+    #[inline(always)]
+    pub fn key_row(&self, y: f64) -> f64 {
+        self.key[1] * y + self.key[2]
+    }
+
+    /// The key at a sample, held within the triangle's own range.
+    #[inline(always)]
+    pub fn key_at(&self, x: f64, row: f64) -> f64 {
+        let key = self.key[0] * x + row;
+        // Not `clamp`: these compile to one instruction each.
+        let key = if key > self.key_min { key } else { self.key_min };
+        if key < self.key_max { key } else { self.key_max }
     }
 
     /// The largest key inside the tile.
@@ -170,7 +213,7 @@ impl Footprint {
     /// The inside of every edge is a half-line in x also in floating point, so the
     /// range is found by a division and then corrected by asking the edge itself.
     #[inline]
-    pub fn span(&self, xs: &[f64], y: f64, step: f64) -> (usize, usize) {
+    pub fn span(&self, xs: &[f64], y: f64, per_step: f64) -> (usize, usize) {
         let (mut first, mut end) = (0usize, xs.len());
         for k in 0..3 {
             if first >= end {
@@ -186,7 +229,7 @@ impl Footprint {
             }
             // Saturating casts: an edge that crosses far away, or an overflow, ends at
             // the border, from where the steps below correct it.
-            let guess = ((-row / cx - xs[0]) / step).ceil() as i64;
+            let guess = ((-row / cx - xs[0]) * per_step).ceil() as i64;
             let mut at = guess.clamp(first as i64, end as i64) as usize;
             if cx > 0.0 {
                 while at < end && !self.inside_edge(k, xs[at], row) {
@@ -212,7 +255,7 @@ impl Footprint {
 
 /// Closed sample bounds of the part in front of the near plane, one sample wider
 /// than needed for rounding; `None` if it lies beside the image or behind.
-fn sample_bounds(lens: &Lens, p: &[DVec3; 3]) -> Option<(u32, u32, u32, u32)> {
+fn sample_bounds(lens: &Lens, p: &[DVec3; 3]) -> Option<Bounds> {
     let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     let mut take = |x: f64, y: f64| {
         (lo, hi) = ([lo[0].min(x), lo[1].min(y)], [hi[0].max(x), hi[1].max(y)]);
@@ -225,7 +268,8 @@ fn sample_bounds(lens: &Lens, p: &[DVec3; 3]) -> Option<(u32, u32, u32, u32)> {
         for i in 0..3 {
             let (a, b) = (p[i], p[(i + 1) % 3]);
             if a.z >= near {
-                take(a.x / a.z, a.y / a.z);
+                let w = 1.0 / a.z;
+                take(a.x * w, a.y * w);
             }
             if (a.z >= near) != (b.z >= near) {
                 let c = a + (b - a) * ((near - a.z) / (b.z - a.z));
@@ -235,11 +279,10 @@ fn sample_bounds(lens: &Lens, p: &[DVec3; 3]) -> Option<(u32, u32, u32, u32)> {
     }
     let last = [lens.grid.columns() - 1, lens.grid.rows() - 1].map(f64::from);
     // Sample coordinates; the rows run down.
-    let x = [lo[0], hi[0]].map(|x| (x - lens.xs[0]) / lens.step[0]);
-    let y = [hi[1], lo[1]].map(|y| (lens.ys[0] - y) / lens.step[1]);
-    // Rounding of a coordinate is far below a thousandth of a sample.
-    let ceil = |v: f64| (v - 1e-3).ceil().max(0.0);
-    let floor = |v: f64, last: f64| (v + 1e-3).floor().min(last);
+    let x = [lo[0], hi[0]].map(|x| (x - lens.xs[0]) * lens.per_step[0]);
+    let y = [hi[1], lo[1]].map(|y| (lens.ys[0] - y) * lens.per_step[1]);
+    let ceil = |v: f64| (v - BOUND_SLACK).ceil().max(0.0);
+    let floor = |v: f64, last: f64| (v + BOUND_SLACK).floor().min(last);
     let (x0, x1, y0, y1) = (ceil(x[0]), floor(x[1], last[0]), ceil(y[0]), floor(y[1], last[1]));
-    (x0 <= x1 && y0 <= y1).then_some((x0 as u32, x1 as u32, y0 as u32, y1 as u32))
+    (x0 <= x1 && y0 <= y1).then_some([x0 as u32, x1 as u32, y0 as u32, y1 as u32])
 }

@@ -67,6 +67,15 @@ impl Grid {
         TileRect { x0, y0, x1: (x0 + side).min(self.columns()), y1: (y0 + side).min(self.rows()) }
     }
 
+    /// Tile of a sample, and its index there, row-major.
+    #[inline]
+    pub fn place(&self, x: u32, y: u32) -> (u32, u32) {
+        let side = self.tile_side();
+        let (i, j) = (x / side, y / side);
+        let width = side.min(self.columns() - i * side);
+        (j * self.tiles_across() + i, (y - j * side) * width + x - i * side)
+    }
+
     /// Pixel index of a sample.
     pub fn pixel(&self, x: u32, y: u32) -> usize {
         (y / self.samples * self.width_px + x / self.samples) as usize

@@ -1,8 +1,8 @@
 //! The item buffer: which triangle every sample of the image sees, in f64.
 //!
-//! A tiled scan-line rasteriser. Triangles are set up once, binned to tiles and
-//! drawn nearest first within a tile, so that a full tile ends the work as soon
-//! as everything left lies behind it. Inside a row only the depth is compared.
+//! A tiled scan-line rasteriser. Triangles are set up once ([`super::set_up`]),
+//! binned to tiles and drawn nearest first within a tile ([`super::tile`]), so
+//! that a full tile ends the work as soon as everything left lies behind it.
 //!
 //! - Back faces of single-sided triangles and what is certainly outside the view
 //!   volume are not drawn ([`super::sets`] decides, exactly).
@@ -13,58 +13,60 @@
 //!   sample sees each of them that no hiding triangle covers.
 //!
 //! Class: sample-exact. Every id in it has a ray that hits the triangle first.
-//! Nothing depends on the number of threads.
+//! Nothing depends on the number of threads, or on the instruction set.
+
+pub use super::tile::TIE;
 
 use super::footprint::{Footprint, Lens};
-use super::image::{ANY, BACKGROUND, Grid, TileRect, TileRuns, Veil};
+use super::image::{Grid, TileRuns};
+use super::lanes::Kernel;
+use super::set_up::{Part, SetUp, Speck};
 use super::sets::Standing;
-use crate::math::{DVec3, View};
+use super::tile::{Content, Tile};
+use crate::math::View;
 use crate::scene::Scene;
 use rayon::prelude::*;
 
-/// Depth keys closer than this share of each other are equal: far above the
-/// rounding of the key (about 1e-14 unless the triangle is a sliver), far below
-/// any distance a picture could show (10 nm at 10 m).
-pub const TIE: f64 = 1.0 / (1u64 << 30) as f64;
+/// Triangles set up by one task: a place within a part takes so many bits.
+const CHUNK_BITS: u32 = 13;
 
 /// Draws `scene` from `view`; the tiles in the order of [`Grid::tile`].
 pub fn draw(scene: &Scene, view: &View, standings: &[Standing], grid: Grid) -> Vec<TileRuns> {
+    draw_on(Kernel::best(), scene, view, standings, grid)
+}
+
+fn draw_on(kernel: Kernel, scene: &Scene, view: &View, standings: &[Standing], grid: Grid) -> Vec<TileRuns> {
     let lens = Lens::new(view, grid);
-    let footprints = set_up(scene, view, standings, &lens);
-    let bins = Bins::new(&footprints, grid);
+    let set_up = SetUp { scene, view, standings, lens: &lens };
+    let chunk = 1 << CHUNK_BITS;
+    let parts: Vec<Part> = (0..scene.len().div_ceil(chunk))
+        .into_par_iter()
+        .map(|i| set_up.chunk(kernel, i * chunk..((i + 1) * chunk).min(scene.len())))
+        .collect();
+    let (bins, specks) = rayon::join(|| Bins::new(&parts, grid), || SpeckBins::new(&parts, grid));
     (0..grid.tile_count())
         .into_par_iter()
-        .map_init(Tile::default, |tile, index| tile.draw(&lens, grid.tile(index), &footprints, bins.of(index)))
+        .map_init(Tile::default, |tile, index| {
+            let footprints = bins.of(index).iter().map(|place| footprint(&parts, *place));
+            let content = Content { footprints, specks: specks.of(index) };
+            tile.draw(kernel, &lens, grid.tile(index), content)
+        })
         .collect()
 }
 
-fn set_up(scene: &Scene, view: &View, standings: &[Standing], lens: &Lens) -> Vec<Footprint> {
-    const CHUNK: usize = 8192;
-    let camera: Vec<DVec3> = scene.positions.par_iter().with_min_len(CHUNK).map(|p| view.to_camera(*p)).collect();
-    let parts: Vec<Vec<Footprint>> = standings
-        .par_chunks(CHUNK)
-        .enumerate()
-        .map(|(chunk, standings)| {
-            let drawn = standings.iter().enumerate().filter(|(_, s)| s.drawable());
-            let t = drawn.map(|(i, _)| chunk * CHUNK + i);
-            t.filter_map(|t| {
-                let corners = scene.triangles[t].map(|v| camera[v as usize]);
-                Footprint::new(lens, t as u32 + 1, scene.occluder[t], corners)
-            })
-            .collect()
-        })
-        .collect();
-    parts.concat()
+#[inline]
+fn footprint(parts: &[Part], place: u32) -> &Footprint {
+    &parts[(place >> CHUNK_BITS) as usize].footprints[(place & ((1 << CHUNK_BITS) - 1)) as usize]
 }
 
-/// Indices of footprints by tile, ascending within a tile.
+/// Footprints by tile, as places in the parts, ascending within a tile.
 struct Bins {
     first: Vec<u32>,
     items: Vec<u32>,
 }
 
 impl Bins {
-    fn new(footprints: &[Footprint], grid: Grid) -> Bins {
+    fn new(parts: &[Part], grid: Grid) -> Bins {
         let side = grid.tile_side();
         let across = grid.tiles_across();
         let mut first = vec![0u32; grid.tile_count() as usize + 1];
@@ -72,19 +74,19 @@ impl Bins {
             let (i0, i1) = (f.x0 / side, f.x1 / side);
             (f.y0 / side..=f.y1 / side).flat_map(move |j| (i0..=i1).map(move |i| (j * across + i) as usize))
         };
-        for f in footprints {
+        for f in parts.iter().flat_map(|p| &p.footprints) {
             tiles(f).for_each(|t| first[t + 1] += 1);
         }
-        for t in 1..first.len() {
-            first[t] += first[t - 1];
-        }
+        accumulate(&mut first);
         let mut items = vec![0; *first.last().expect("one more than tiles") as usize];
         let mut next = first.clone();
-        for (index, f) in footprints.iter().enumerate() {
-            tiles(f).for_each(|t| {
-                items[next[t] as usize] = index as u32;
-                next[t] += 1;
-            });
+        for (part, p) in (0u32..).zip(parts) {
+            for (place, f) in (part << CHUNK_BITS..).zip(&p.footprints) {
+                tiles(f).for_each(|t| {
+                    items[next[t] as usize] = place;
+                    next[t] += 1;
+                });
+            }
         }
         Bins { first, items }
     }
@@ -94,156 +96,170 @@ impl Bins {
     }
 }
 
-/// Buffers of one tile, kept between tiles of a thread.
-#[derive(Default)]
-struct Tile {
-    /// Nearest key so far.
-    best: Vec<f64>,
-    /// What a key must exceed to matter: `best` less the tie.
-    gate: Vec<f64>,
-    winner: Vec<u32>,
-    alternate: Vec<u32>,
-    order: Vec<(f64, u32)>,
+/// Specks by tile.
+struct SpeckBins {
+    first: Vec<u32>,
+    items: Vec<Speck>,
 }
 
-impl Tile {
-    fn draw(&mut self, lens: &Lens, rect: TileRect, footprints: &[Footprint], bin: &[u32]) -> TileRuns {
-        let size = rect.width() * rect.height();
-        // What is as far as the far plane is still in: the gate lets it pass.
-        for (buffer, value) in [(&mut self.best, lens.key_far), (&mut self.gate, lens.key_far.next_down())] {
-            buffer.clear();
-            buffer.resize(size, value);
+impl SpeckBins {
+    fn new(parts: &[Part], grid: Grid) -> SpeckBins {
+        let mut first = vec![0u32; grid.tile_count() as usize + 1];
+        for s in parts.iter().flat_map(|p| &p.specks) {
+            first[s.tile as usize + 1] += 1;
         }
-        for buffer in [&mut self.winner, &mut self.alternate] {
-            buffer.clear();
-            buffer.resize(size, BACKGROUND);
+        accumulate(&mut first);
+        let nothing = Speck { key: 0.0, id: 0, tile: 0, at: 0 };
+        let mut items = vec![nothing; *first.last().expect("one more than tiles") as usize];
+        let mut next = first.clone();
+        for s in parts.iter().flat_map(|p| &p.specks) {
+            let next = &mut next[s.tile as usize];
+            items[*next as usize] = *s;
+            *next += 1;
         }
-        let xs = &lens.xs[rect.x0 as usize..rect.x1 as usize];
-        let ys = &lens.ys[rect.y0 as usize..rect.y1 as usize];
-        let (across, down) = ([xs[0], xs[xs.len() - 1]], [ys[ys.len() - 1], ys[0]]);
-        self.order.clear();
-        self.order.extend(bin.iter().map(|i| (footprints[*i as usize].key_max_in(across, down), *i)));
-        // Nearest first; equal keys by triangle, so that the order is total.
-        self.order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-
-        let order = std::mem::take(&mut self.order);
-        let mut drawn_area = 0;
-        for (key_max, index) in &order {
-            let f = &footprints[*index as usize];
-            if !f.occluder {
-                continue;
-            }
-            if drawn_area >= size {
-                // All that follows is farther still.
-                let farthest = self.gate.iter().fold(f64::INFINITY, |m, g| if *g < m { *g } else { m });
-                if *key_max <= farthest {
-                    break;
-                }
-                drawn_area = 0;
-            }
-            drawn_area += self.draw_occluder(lens, rect, xs, ys, f);
-        }
-        let mut runs = TileRuns::encode(&self.winner, &self.alternate);
-        for (_, index) in order.iter().filter(|(_, i)| !footprints[*i as usize].occluder) {
-            self.draw_veil(lens, rect, xs, ys, &footprints[*index as usize], &mut runs.veils);
-        }
-        runs.veils.sort_unstable_by_key(|v| (v.id, v.y, v.x));
-        self.order = order;
-        runs
+        SpeckBins { first, items }
     }
 
-    /// Returns the work done in samples, to decide when asking for the farthest
-    /// key is worth it.
-    fn draw_occluder(&mut self, lens: &Lens, rect: TileRect, xs: &[f64], ys: &[f64], f: &Footprint) -> usize {
-        let mut work = 0;
-        for_rows(lens, rect, xs, ys, f, |row, x0, x1, key_row| {
-            work += x1 - x0;
-            let at = row * xs.len();
-            // Most samples of most rows lie behind what is drawn: find the others
-            // eight at a time without a branch.
-            const LANES: usize = 8;
-            for start in (x0..x1).step_by(LANES) {
-                let end = (start + LANES).min(x1);
-                let mut passes = 0u32;
-                for (i, (x, gate)) in xs[start..end].iter().zip(&self.gate[at + start..at + end]).enumerate() {
-                    passes |= u32::from(key_at(f, *x, key_row) > *gate) << i;
-                }
-                while passes != 0 {
-                    let x = start + passes.trailing_zeros() as usize;
-                    passes &= passes - 1;
-                    self.take(lens, at + x, f.id, key_at(f, xs[x], key_row));
+    fn of(&self, tile: u32) -> &[Speck] {
+        &self.items[self.first[tile as usize] as usize..self.first[tile as usize + 1] as usize]
+    }
+}
+
+fn accumulate(counts: &mut [u32]) {
+    for i in 1..counts.len() {
+        counts[i] += counts[i - 1];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Camera, DVec3, Pose, Projection};
+    use crate::oracle::image::{ANY, BACKGROUND, Veil};
+    use crate::oracle::sets::standings;
+    use proptest::prelude::*;
+
+    /// The twin: every sample asks every triangle, and the definition is read off.
+    fn sample_by_sample(scene: &Scene, view: &View, standings: &[Standing], grid: Grid) -> Vec<TileRuns> {
+        let lens = Lens::new(view, grid);
+        let new = |t: u32| {
+            let corners = scene.corners(t).map(|p| view.to_camera(p));
+            Footprint::new(&lens, t + 1, scene.occluder[t as usize], corners)
+        };
+        let drawn = (0..scene.len() as u32).filter(|t| standings[*t as usize].drawable());
+        let footprints: Vec<Footprint> = drawn.filter_map(new).collect();
+        let tile = |index: u32| {
+            let rect = grid.tile(index);
+            let (mut winners, mut alternates, mut seen) = (Vec::new(), Vec::new(), Vec::new());
+            for (y, x) in (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (y, x))) {
+                let at = [lens.xs[x as usize], lens.ys[y as usize]];
+                let inside = |f: &&Footprint| (f.x0..=f.x1).contains(&x) && (f.y0..=f.y1).contains(&y) && f.inside(at);
+                let hits: Vec<(&Footprint, f64)> = footprints
+                    .iter()
+                    .filter(inside)
+                    .map(|f| (f, f.key_at(at[0], f.key_row(at[1]))))
+                    .filter(|(_, key)| *key >= lens.key_far && *key <= lens.key_near)
+                    .collect();
+                let hiding = hits.iter().filter(|(f, _)| f.occluder);
+                let nearest = hiding.clone().map(|(_, key)| *key).fold(f64::NEG_INFINITY, f64::max);
+                let equal: Vec<u32> =
+                    hiding.filter(|(_, key)| *key > nearest - TIE * nearest.abs()).map(|(f, _)| f.id).collect();
+                winners.push(equal.first().copied().unwrap_or(BACKGROUND));
+                alternates.push(match equal[..] {
+                    [] | [_] => BACKGROUND,
+                    [_, other] => other,
+                    _ => ANY,
+                });
+                let in_front = |key: f64| nearest == f64::NEG_INFINITY || key > nearest + TIE * nearest.abs();
+                seen.extend(hits.iter().filter(|(f, key)| !f.occluder && in_front(*key)).map(|(f, _)| (f.id, y, x)));
+            }
+            seen.sort_unstable();
+            let mut runs = TileRuns::encode(&winners, &alternates);
+            for (id, y, x) in seen {
+                match runs.veils.last_mut() {
+                    Some(v) if v.id == id && v.y == y && v.x + v.len == x => v.len += 1,
+                    _ => runs.veils.push(Veil { x, y, len: 1, id }),
                 }
             }
-        });
-        work
+            runs
+        };
+        (0..grid.tile_count()).map(tile).collect()
     }
 
-    /// A sample whose key passed the gate.
-    #[inline]
-    fn take(&mut self, lens: &Lens, at: usize, id: u32, key: f64) {
-        if key > lens.key_near {
-            return;
+    fn scene_of(corners: impl Iterator<Item = ([DVec3; 3], bool, bool)>) -> Scene {
+        let mut scene = Scene::default();
+        for (corners, two_sided, occluder) in corners {
+            let v = scene.positions.len() as u32;
+            scene.positions.extend(corners);
+            scene.triangles.push([v, v + 1, v + 2]);
+            scene.two_sided.push(two_sided);
+            scene.occluder.push(occluder);
         }
-        let best = self.best[at];
-        if self.winner[at] == BACKGROUND || key > best + TIE * best.abs() {
-            (self.winner[at], self.alternate[at], self.best[at]) = (id, BACKGROUND, key);
-        } else {
-            let (winner, alternate) = (self.winner[at], self.alternate[at]);
-            self.alternate[at] = if alternate == BACKGROUND { winner.max(id) } else { ANY };
-            self.winner[at] = winner.min(id);
-            self.best[at] = best.max(key);
-        }
-        self.gate[at] = self.best[at] - TIE * self.best[at].abs();
+        scene
     }
 
-    fn draw_veil(&self, lens: &Lens, rect: TileRect, xs: &[f64], ys: &[f64], f: &Footprint, veils: &mut Vec<Veil>) {
-        for_rows(lens, rect, xs, ys, f, |row, x0, x1, key_row| {
-            let seen = |x: usize| {
-                let (at, key) = (row * xs.len() + x, key_at(f, xs[x], key_row));
-                let best = self.best[at];
-                // Strictly in front: on a decal's own wall either may be what is seen.
-                let in_front = self.winner[at] == BACKGROUND && key >= best || key > best + TIE * best.abs();
-                in_front && key <= lens.key_near
+    fn views() -> [View; 3] {
+        let pose = Pose { eye: DVec3::ZERO, forward: DVec3::X, up: DVec3::Z };
+        let ortho = Projection::Orthographic { height_m: 6.0 };
+        [
+            Camera { near_m: 1.0, ..Camera::default() },
+            Camera { near_m: 0.5, far_m: Some(5.0), ..Camera::default() },
+            Camera { projection: ortho, near_m: 1.0, ..Camera::default() },
+        ]
+        .map(|camera| View::new(&camera, &pose))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn tiles_agree_with_every_sample_asking_every_triangle(
+            coordinates in proptest::collection::vec(-6i32..7, 9 * 40),
+            size in prop_oneof![Just(0.05), Just(0.25), Just(1.0)],
+            samples in 1u32..4,
+        ) {
+            // Whole coordinates: coplanar and repeated triangles, slivers, and corners behind the eye.
+            let corner = |c: &[i32], k: usize, middle: DVec3| {
+                middle + DVec3::new(f64::from(c[k]), f64::from(c[k + 1]), f64::from(c[k + 2])) * size
             };
-            let mut x = x0;
-            while x < x1 {
-                let len = (x..x1).take_while(|x| seen(*x)).count();
-                if len > 0 {
-                    veils.push(Veil { x: rect.x0 + x as u32, y: rect.y0 + row as u32, len: len as u32, id: f.id });
+            let scene = scene_of(coordinates.chunks(9).enumerate().map(|(i, c)| {
+                let middle = DVec3::new(4.0, f64::from(c[0]) * 0.4, f64::from(c[1]) * 0.3);
+                ([0, 3, 6].map(|k| corner(c, k, middle)), i % 4 != 0, i % 6 != 5)
+            }));
+            for view in views() {
+                let grid = Grid { width_px: 70, height_px: 40, samples };
+                let (standings, _) = standings(&scene, &view);
+                let twin = sample_by_sample(&scene, &view, &standings, grid);
+                for kernel in [Kernel::Plain, Kernel::best()] {
+                    prop_assert_eq!(&draw_on(kernel, &scene, &view, &standings, grid), &twin);
                 }
-                x += len + 1;
             }
-        });
-    }
-}
-
-/// Visits the rows of `f` in the tile: row and columns within the tile, half-open,
-/// and the part of the key that does not depend on x.
-#[inline]
-fn for_rows(
-    lens: &Lens,
-    rect: TileRect,
-    xs: &[f64],
-    ys: &[f64],
-    f: &Footprint,
-    mut visit: impl FnMut(usize, usize, usize, f64),
-) {
-    let first = (f.x0.max(rect.x0) - rect.x0) as usize;
-    let end = (f.x1 + 1).min(rect.x1).saturating_sub(rect.x0) as usize;
-    for y in f.y0.max(rect.y0)..(f.y1 + 1).min(rect.y1) {
-        let row = (y - rect.y0) as usize;
-        let (a, b) = f.span(&xs[first..end], ys[row], lens.step_x());
-        if a < b {
-            visit(row, first + a, first + b, f.key[1] * ys[row] + f.key[2]);
         }
     }
-}
 
-/// The key at a sample, held within the triangle's own range.
-#[inline(always)]
-fn key_at(f: &Footprint, x: f64, row: f64) -> f64 {
-    let key = f.key[0] * x + row;
-    // Not `clamp`: these compile to one instruction each.
-    let key = if key < f.key_min { f.key_min } else { key };
-    if key > f.key_max { f.key_max } else { key }
+    #[test]
+    fn a_chain_of_near_ties_counts_only_those_equal_to_the_nearest() {
+        // Each wall lies 0.7 of a tie behind the one before: neighbours are equal,
+        // the first and the third are not. Drawn in every order of ids.
+        let wall = |depth: f64| {
+            let p = |y: f64, z: f64| DVec3::new(depth, y * 50.0, z * 50.0);
+            [p(-1.0, -1.0), p(1.0, -1.0), p(0.0, 1.0)]
+        };
+        let depths = [0.0, 0.7, 1.4, 2.1].map(|n| 4.0 * (1.0 + n * TIE));
+        for order in [[0, 1, 2, 3], [3, 2, 1, 0], [2, 0, 3, 1], [1, 3, 0, 2], [3, 0, 2, 1]] {
+            let scene = scene_of(order.into_iter().map(|k: usize| (wall(depths[k]), true, true)));
+            for view in views() {
+                let grid = Grid { width_px: 20, height_px: 9, samples: 1 };
+                let (standings, _) = standings(&scene, &view);
+                let twin = sample_by_sample(&scene, &view, &standings, grid);
+                for kernel in [Kernel::Plain, Kernel::best()] {
+                    assert_eq!(draw_on(kernel, &scene, &view, &standings, grid), twin);
+                }
+                let id = |k: usize| order.iter().position(|o| *o == k).expect("listed") as u32 + 1;
+                twin[0].for_each(grid.tile(0), |run| {
+                    let (a, b) = (id(0).min(id(1)), id(0).max(id(1)));
+                    assert!(run.winner == BACKGROUND || (run.winner, run.alternate) == (a, b), "{run:?}");
+                });
+            }
+        }
+    }
 }

@@ -24,11 +24,14 @@ pub mod hiding;
 pub mod image;
 pub mod item_buffer;
 pub mod judge;
+pub mod lanes;
 pub mod lines;
 pub mod outline;
 pub mod patch;
 pub mod rays;
+pub mod set_up;
 pub mod sets;
+pub mod tile;
 pub mod verdict;
 pub mod volume;
 
