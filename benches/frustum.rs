@@ -1,33 +1,105 @@
-//! The frustum kernels over boxes in list form against the memory they have to
-//! read: `cargo bench --no-default-features --bench frustum`.
+//! The frustum test over boxes in list form:
+//! `cargo bench --no-default-features --bench frustum [-- kernels | arithmetics | NAME...]`.
 //!
-//! The floor reads the same 24 bytes a box with the widest loads this processor
-//! has and does nothing but OR them together. Floor and kernels take turns, so
-//! that a disturbance meets all of them; medians of many turns are compared.
+//! `kernels`: those of `f32_relative` against the memory they have to read. The floor
+//! reads the same 24 bytes a box with the widest loads this processor has and
+//! does nothing but OR them together. `arithmetics`: the whole test in all six, or in those
+//! that are named, against `f32_relative`. All take turns, so that a disturbance meets
+//! all of them; medians of many turns are compared, spread is the middle half.
 
 use cullmark::culling::frustum::{Kernels, kernels};
 use cullmark::culling::frustum_planes::FramePlanes;
-use cullmark::hierarchy::{BoundsBlock, LANES};
-use cullmark::math::{Box32, Camera, DVec3, Pose, Vec3, View};
+use cullmark::culling::{Tally, Test, make_tests_in};
+use cullmark::hierarchy::{BoundsBlock, Hierarchy, LANES, LinkBlock};
+use cullmark::math::{Arithmetic, Box32, Camera, DVec3, Pose, Vec3, View};
+use cullmark::registry::Spec;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 use std::hint::black_box;
 use std::time::Instant;
 
 fn main() {
-    println!("{:>8} {:>8} {:>10} {:>10} {:>8} {:>7}", "boxes", "kernel", "ns a box", "GB/s", "of floor", "kept");
-    let mut met = true;
-    for (count, turns) in [(2_000, 4001), (64_000, 401), (1_000_000, 101)] {
-        met &= compare(count, turns);
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let asked = |name: &str| wanted.is_empty() || wanted.iter().any(|w| w == name);
+    if asked("kernels") {
+        println!("{:>8} {:>8} {:>10} {:>10} {:>8} {:>7}", "boxes", "kernel", "ns a box", "GB/s", "of floor", "kept");
+        let mut met = true;
+        for (count, turns) in [(2_000, 4001), (64_000, 401), (1_000_000, 101)] {
+            met &= compare(count, turns);
+        }
+        println!("1 M boxes within 1.3x of the floor: {}", if met { "yes" } else { "NO" });
     }
-    println!("1 M boxes within 1.3x of the floor: {}", if met { "yes" } else { "NO" });
+    let chosen: Vec<Arithmetic> =
+        Arithmetic::ALL.into_iter().filter(|a| asked("arithmetics") || asked(a.name())).collect();
+    if !chosen.is_empty() {
+        for (count, turns) in [(2_000, 401), (64_000, 41), (1_000_000, 11)] {
+            arithmetics(&chosen, count, turns);
+        }
+    }
+}
+
+/// Prints the table of the test in `chosen` arithmetics, with ratios turn by turn to the default.
+fn arithmetics(chosen: &[Arithmetic], count: usize, turns: usize) {
+    let bounds = random_boxes(count);
+    let links = vec![LinkBlock { live: 0xff, ..LinkBlock::EMPTY }; bounds.len()];
+    let h = Hierarchy { root_blocks: links.len() as u32, bounds, links, ..Default::default() };
+    let mut names = vec![Arithmetic::default()];
+    names.extend(chosen.iter().filter(|a| **a != Arithmetic::default()));
+    let view = view();
+    let mut tests: Vec<Box<dyn Test>> = names
+        .iter()
+        .map(|a| {
+            let (mut tests, _) = make_tests_in(&[Spec::new("frustum")], *a).expect("the test exists");
+            tests[0].prepare(&Default::default(), &h);
+            tests.remove(0)
+        })
+        .collect();
+    let mut outside = vec![0u8; h.links.len()];
+    let mut tallies = vec![Tally::default(); tests.len()];
+    let mut times = vec![Vec::with_capacity(turns); tests.len()];
+    let rounds = (64_000 / count).max(1);
+    for _ in 0..turns {
+        for (i, test) in tests.iter_mut().enumerate() {
+            // Planes are made anew, as in every frame.
+            times[i].push(timed(rounds, || {
+                outside.fill(0);
+                tallies[i] = Tally::default();
+                test.begin(&view, &h);
+                test.judge_flat(black_box(&h), &mut outside, &mut tallies[i]);
+            }));
+        }
+    }
+    let boxes = (rounds * count) as f64;
+    println!(
+        "{:>8} {:>13} {:>9} {:>17} {:>20} {:>8} {:>9}",
+        "boxes", "arithmetic", "ns a box", "middle half", "of f32_relative", "kept", "fallbacks"
+    );
+    for (i, test) in tests.iter_mut().enumerate() {
+        outside.fill(0);
+        test.judge_flat(&h, &mut outside, &mut Tally::default());
+        let kept: u32 = outside.iter().map(|o| o.count_zeros()).sum();
+        let [low, middle, high] = quartiles(times[i].iter().map(|t| t / boxes).collect());
+        let [least, ratio, most] = quartiles(times[i].iter().zip(&times[0]).map(|(t, base)| t / base).collect());
+        let t = tallies[i];
+        println!(
+            "{count:>8} {:>13} {middle:>9.3} {:>17} {:>20} {kept:>8} {:>9}",
+            names[i].name(),
+            format!("[{low:.3}-{high:.3}]"),
+            format!("{ratio:.2} [{least:.2}-{most:.2}]"),
+            format!("{}, {}", t.fallbacks_f64, t.fallbacks_exact),
+        );
+    }
+}
+
+fn view() -> View {
+    let pose = Pose { eye: DVec3::new(0.3, -0.2, 0.1), forward: DVec3::new(0.8, 0.5, 0.1), up: DVec3::Z };
+    View::new(&Camera::default(), &pose)
 }
 
 /// Prints one table; true unless the best kernel misses the target at a million.
 fn compare(count: usize, turns: usize) -> bool {
     let bounds = random_boxes(count);
     let live = vec![0xffu8; bounds.len()];
-    let pose = Pose { eye: DVec3::new(0.3, -0.2, 0.1), forward: DVec3::new(0.8, 0.5, 0.1), up: DVec3::Z };
-    let planes = FramePlanes::new(&View::new(&Camera::default(), &pose), DVec3::ZERO);
+    let planes = FramePlanes::new(&view(), DVec3::ZERO);
     let kernels = kernels();
     let mut outside = vec![0u8; bounds.len()];
     let mut times = vec![Vec::with_capacity(turns); kernels.len() + 1];
@@ -81,9 +153,13 @@ fn timed(rounds: usize, mut work: impl FnMut()) -> f64 {
     start.elapsed().as_nanos() as f64
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+fn median(values: Vec<f64>) -> f64 {
+    quartiles(values)[1]
+}
+
+fn quartiles(mut values: Vec<f64>) -> [f64; 3] {
     values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+    [1, 2, 3].map(|q| values[(values.len() - 1) * q / 4])
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -1,9 +1,8 @@
-//! `f64` frustum kernels for x86-64: AVX2 (4 boxes a register) and AVX-512 (8).
-//! Explicit intrinsics; the operations and their order are those of `frustum_f64::block`.
+//! `f64` frustum kernel for x86-64: AVX2, 4 boxes a register. Explicit intrinsics; the operations and their order are those of `frustum_f64::block`.
 
 use super::frustum_f64::{GUARD, Planes64};
 use super::frustum_planes::PlaneMasks;
-pub use super::frustum_x86::{has_avx2, has_avx512};
+pub use super::frustum_x86::has_avx2;
 use crate::hierarchy::BoundsBlock;
 use std::arch::x86_64::*;
 
@@ -15,16 +14,6 @@ pub fn block_avx2(frame: &Planes64, bounds: &BoundsBlock, wanted: u8, want_insid
     assert!(has_avx2());
     // SAFETY: the processor has the feature, as just asserted.
     unsafe { block_256(frame, bounds, wanted, want_inside, out) }
-}
-
-/// See `frustum_f64::block`.
-///
-/// # Panics
-/// If the processor lacks AVX-512 F and DQ.
-pub fn block_avx512(frame: &Planes64, bounds: &BoundsBlock, wanted: u8, want_inside: bool, out: &mut PlaneMasks) {
-    assert!(has_avx512());
-    // SAFETY: the processor has the features, as just asserted.
-    unsafe { block_512(frame, bounds, wanted, want_inside, out) }
 }
 
 #[target_feature(enable = "avx2")]
@@ -79,36 +68,4 @@ fn value_256(normal: &[f64; 3], a: &[__m256d; 8], corner: &[usize; 3], d: f64) -
     let product = |axis: usize| _mm256_mul_pd(_mm256_set1_pd(normal[axis]), a[corner[axis] & 7]);
     let s = _mm256_add_pd(product(0), _mm256_set1_pd(d));
     _mm256_add_pd(_mm256_add_pd(s, product(1)), product(2))
-}
-
-#[target_feature(enable = "avx512f,avx512dq")]
-fn block_512(frame: &Planes64, bounds: &BoundsBlock, wanted: u8, want_inside: bool, out: &mut PlaneMasks) {
-    let mut a = [_mm512_setzero_pd(); 8];
-    let mut magnitude = [_mm512_setzero_pd(); 3];
-    for axis in 0..3 {
-        let eye = _mm512_set1_pd(frame.eye[axis]);
-        // SAFETY: a row of 8 f32 is 32 bytes, and rows are 32-byte aligned in the 64-byte aligned block.
-        let row = |row: &[f32; 8]| unsafe { _mm512_cvtps_pd(_mm256_load_ps(row.as_ptr())) };
-        let (lo, hi) = (_mm512_sub_pd(row(&bounds.lo[axis]), eye), _mm512_sub_pd(row(&bounds.hi[axis]), eye));
-        magnitude[axis] = _mm512_add_pd(_mm512_abs_pd(lo), _mm512_abs_pd(hi));
-        (a[axis], a[axis + 3]) = (lo, hi);
-    }
-    let total = _mm512_add_pd(_mm512_add_pd(magnitude[0], magnitude[1]), magnitude[2]);
-    let guard = _mm512_mul_pd(total, _mm512_set1_pd(GUARD));
-    let minus = _mm512_mul_pd(total, _mm512_set1_pd(-GUARD));
-    let mut wanted = wanted;
-    while wanted != 0 {
-        let k = wanted.trailing_zeros() as usize;
-        wanted &= wanted - 1;
-        let plane = &frame.planes[k];
-        let value = |corner: &[usize; 3], d: f64| {
-            let product = |axis: usize| _mm512_mul_pd(_mm512_set1_pd(plane.normal[axis]), a[corner[axis] & 7]);
-            let s = _mm512_add_pd(product(0), _mm512_set1_pd(d));
-            _mm512_add_pd(_mm512_add_pd(s, product(1)), product(2))
-        };
-        out.outside[k] = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(value(&plane.p, plane.d_out), minus);
-        if want_inside {
-            out.inside[k] = _mm512_cmp_pd_mask::<_CMP_GT_OQ>(value(&plane.n, plane.d_in), guard);
-        }
-    }
 }

@@ -121,9 +121,6 @@ pub fn kernels() -> Vec<(&'static str, Kernel)> {
     #[cfg(target_arch = "x86_64")]
     {
         use super::frustum_fixed_x86 as x86;
-        if x86::has_avx512() {
-            found.push(("avx512", x86::block_avx512));
-        }
         if x86::has_avx2() {
             found.push(("avx2", x86::block_avx2));
         }

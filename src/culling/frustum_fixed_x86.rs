@@ -1,13 +1,13 @@
-//! `fixed_q16` frustum kernels for x86-64: AVX2 (4 boxes a register) and AVX-512 (8).
+//! `fixed_q16` frustum kernel for x86-64: AVX2, 4 boxes a register.
 //! Whole numbers throughout, so the order of sums is free; the answers are those of
 //! `frustum_fixed::block`.
 //!
-//! Both widths multiply the low halves of 64-bit lanes (`mul_epi32`), which is exact for what
+//! The low halves of 64-bit lanes are multiplied (`mul_epi32`), which is exact for what
 //! fits in 32 bits; lanes beyond are found first, and their masks cleared.
 
 use super::frustum_fixed::{FixedBlock, FixedPlanes};
 use super::frustum_planes::PlaneMasks;
-pub use super::frustum_x86::{has_avx2, has_avx512};
+pub use super::frustum_x86::has_avx2;
 use std::arch::x86_64::*;
 
 /// See `frustum_fixed::block`.
@@ -18,22 +18,6 @@ pub fn block_avx2(frame: &FixedPlanes, bounds: &FixedBlock, wanted: u8, want_ins
     assert!(has_avx2());
     // SAFETY: the processor has the feature, as just asserted.
     unsafe { block_256(frame, bounds, wanted, want_inside, out) }
-}
-
-/// See `frustum_fixed::block`.
-///
-/// # Panics
-/// If the processor lacks AVX-512 F and DQ.
-pub fn block_avx512(
-    frame: &FixedPlanes,
-    bounds: &FixedBlock,
-    wanted: u8,
-    want_inside: bool,
-    out: &mut PlaneMasks,
-) -> u8 {
-    assert!(has_avx512());
-    // SAFETY: the processor has the features, as just asserted.
-    unsafe { block_512(frame, bounds, wanted, want_inside, out) }
 }
 
 /// Four boxes: relative rows (two registers pad the index), guards, and lanes beyond reach.
@@ -100,44 +84,6 @@ fn block_256(frame: &FixedPlanes, bounds: &FixedBlock, wanted: u8, want_inside: 
         out.outside[k] = (outside(&halves[0]) | outside(&halves[1]) << 4) & !beyond;
         if want_inside {
             out.inside[k] = (inside(&halves[0]) | inside(&halves[1]) << 4) & !beyond;
-        }
-    }
-    beyond
-}
-
-#[target_feature(enable = "avx512f,avx512dq")]
-fn block_512(frame: &FixedPlanes, bounds: &FixedBlock, wanted: u8, want_inside: bool, out: &mut PlaneMasks) -> u8 {
-    let zero = _mm512_setzero_si512();
-    let (most, least) = (_mm512_set1_epi64(i64::from(i32::MAX)), _mm512_set1_epi64(i64::from(i32::MIN)));
-    let mut a = [zero; 8];
-    let mut beyond = 0;
-    for row in 0..6 {
-        // SAFETY: a row of 8 i32 is 32 bytes, and rows are 32-byte aligned in the 64-byte aligned block.
-        let narrow = unsafe { _mm256_load_si256(bounds.rows[row].as_ptr().cast()) };
-        let x = _mm512_sub_epi64(_mm512_cvtepi32_epi64(narrow), _mm512_set1_epi64(frame.eye[row % 3]));
-        beyond |= _mm512_cmpgt_epi64_mask(x, most) | _mm512_cmplt_epi64_mask(x, least);
-        a[row] = x;
-    }
-    let mut sum = _mm512_set1_epi64(1);
-    for axis in 0..3 {
-        sum = _mm512_add_epi64(sum, _mm512_max_epi64(_mm512_abs_epi64(a[axis]), _mm512_abs_epi64(a[axis + 3])));
-    }
-    let guard = _mm512_srli_epi64::<1>(sum);
-    let minus = _mm512_sub_epi64(zero, guard);
-    let mut wanted = wanted;
-    while wanted != 0 {
-        let k = wanted.trailing_zeros() as usize;
-        wanted &= wanted - 1;
-        let plane = &frame.planes[k];
-        let value = |corner: &[usize; 3], d: i64| {
-            let normal = |axis: usize| _mm512_set1_epi64(i64::from(plane.normal[axis]));
-            let product = |axis: usize| _mm512_mul_epi32(normal(axis), a[corner[axis] & 7]);
-            let s = _mm512_add_epi64(product(0), _mm512_set1_epi64(d));
-            _mm512_add_epi64(s, _mm512_add_epi64(product(1), product(2)))
-        };
-        out.outside[k] = _mm512_cmplt_epi64_mask(value(&frame.p[k], plane.d_out), minus) & !beyond;
-        if want_inside {
-            out.inside[k] = _mm512_cmpgt_epi64_mask(value(&frame.n[k], plane.d_in), guard) & !beyond;
         }
     }
     beyond
