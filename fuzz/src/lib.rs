@@ -95,7 +95,7 @@ fn scene(path: &Path, data: &[u8]) {
     let n = data.len();
     let spec = SceneSpec {
         winding: [Winding::Ccw, Winding::Cw, Winding::TwoSided][n % 3],
-        up: if n % 2 == 0 { Up::Y } else { Up::Z },
+        up: if n.is_multiple_of(2) { Up::Y } else { Up::Z },
         scale: [1.0, 0.01, 1e6][n / 2 % 3],
         weld: n % 4 < 2,
         ..plain(path)

@@ -134,9 +134,9 @@ impl FixedEye {
         }
         // No branch on the sign: it is as good as random.
         let (mut value, mut off) = (0i128, 0i128);
-        for i in 0..3 {
-            value += i128::from(t.normal[i]) * i128::from(a[i]);
-            off += i128::from(4 * i64::from(t.normal_off[i])) * i128::from(a[i].abs() + 1);
+        for (i, a) in a.iter().enumerate() {
+            value += i128::from(t.normal[i]) * i128::from(*a);
+            off += i128::from(4 * i64::from(t.normal_off[i])) * i128::from(a.abs() + 1);
             off += i128::from(t.normal[i].unsigned_abs());
         }
         if value > off + (off >> 7) + 1 { Fixed::Back } else { Fixed::Kept }

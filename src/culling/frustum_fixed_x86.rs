@@ -34,13 +34,13 @@ fn half_256(frame: &FixedPlanes, bounds: &FixedBlock, first: usize) -> Half {
     let (most, least) = (_mm256_set1_epi64x(i64::from(i32::MAX)), _mm256_set1_epi64x(i64::from(i32::MIN)));
     let mut a = [zero; 8];
     let mut beyond = zero;
-    for row in 0..6 {
+    for (row, a) in a.iter_mut().enumerate().take(6) {
         // SAFETY: `first` is 0 or 4, so four of the row's eight i32 follow; 16-byte aligned in the block.
         let narrow = unsafe { _mm_load_si128(bounds.rows[row].as_ptr().add(first & 4).cast()) };
         let x = _mm256_sub_epi64(_mm256_cvtepi32_epi64(narrow), _mm256_set1_epi64x(frame.eye[row % 3]));
         beyond = _mm256_or_si256(beyond, _mm256_cmpgt_epi64(x, most));
         beyond = _mm256_or_si256(beyond, _mm256_cmpgt_epi64(least, x));
-        a[row] = x;
+        *a = x;
     }
     let size = |x| {
         let negative = _mm256_cmpgt_epi64(zero, x);

@@ -212,7 +212,7 @@ pub fn unknown_name(what: &str, name: &str, known: &[String]) -> Error {
     let mut families: Vec<&str> = known.iter().map(|n| family(n)).collect();
     families.dedup();
     let all = known.iter().map(String::as_str).filter(|_| name.contains(FAMILY)).chain(families.iter().copied());
-    e.help = Some(match did_you_mean(name, all.collect::<Vec<_>>().into_iter()) {
+    e.help = Some(match did_you_mean(name, all.collect::<Vec<_>>()) {
         Some(near) => format!("did you mean `{near}`?"),
         None if known.is_empty() => format!("the manifest names no {what}"),
         None => format!("{what}s: {}", families.join(", ")),

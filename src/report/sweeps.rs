@@ -230,8 +230,9 @@ fn fit(points: &[(f64, f64)]) -> Option<Slope> {
     if points.len() < 2 || xx <= 0.0 {
         return None;
     }
-    // A line without any growth is explained wholly.
-    let r2 = if yy > 0.0 { xy * xy / (xx * yy) } else { 1.0 };
+    // A line without any growth is explained wholly; what rounding leaves of it is not variance.
+    let rounding = 1e-24 * y.iter().map(|y| y * y).sum::<f64>();
+    let r2 = if yy > rounding { xy * xy / (xx * yy) } else { 1.0 };
     Some(Slope { slope: xy / xx, r2, points: points.len() })
 }
 
