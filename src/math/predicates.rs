@@ -36,10 +36,10 @@ pub struct Predicates {
 
 /// Bound of the f64 determinant's error over its permanent: Shewchuk's
 /// `(7 + 56 u) u`, rounded up.
-const FILTER: f64 = 8.0 * f64::EPSILON / 2.0;
+pub(crate) const FILTER: f64 = 8.0 * f64::EPSILON / 2.0;
 /// Permanents outside hold products that may have over- or underflowed, where
 /// the bound says nothing.
-const TRUSTED_PERMANENT: std::ops::Range<f64> = 1e-120..1e120;
+pub(crate) const TRUSTED_PERMANENT: std::ops::Range<f64> = 1e-120..1e120;
 
 impl Predicates {
     /// Facing of `v0 v1 v2` (counter-clockwise from the front) seen from the point `e`.

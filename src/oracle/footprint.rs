@@ -212,7 +212,7 @@ impl Footprint {
     ///
     /// The inside of every edge is a half-line in x also in floating point, so the
     /// range is found by a division and then corrected by asking the edge itself.
-    #[inline]
+    #[inline(always)]
     pub fn span(&self, xs: &[f64], y: f64, per_step: f64) -> (usize, usize) {
         let (mut first, mut end) = (0usize, xs.len());
         for k in 0..3 {

@@ -206,11 +206,34 @@ impl Findings {
     /// Submitted triangles outside V_lo that are drawn for an equal one inside it:
     /// one each, since a class of equal surfaces is one thing to see.
     fn stand_ins(&self, lo: &BitSet, submitted: &BitSet) -> u64 {
-        let mut taken = BTreeSet::new();
-        for (member, others) in &self.replaced {
-            let free = others.iter().find(|o| submitted.contains(**o) && !lo.contains(**o) && !taken.contains(*o));
-            if let Some(other) = free.filter(|_| !self.seen_lost.contains(member)) {
-                taken.insert(*other);
+        let free = |o: &&u32| submitted.contains(**o) && !lo.contains(**o);
+        // Where surfaces meet, a sample on the edge may be either's: as many pairs as
+        // can be made at all, by augmenting paths (Berge 1957).
+        let mut taken: BTreeMap<u32, u32> = BTreeMap::new();
+        for member in self.replaced.keys().filter(|m| !self.seen_lost.contains(m)) {
+            // Each step: a member that looks for a partner, and who asked it to move.
+            let mut asked_by: BTreeMap<u32, (u32, Option<u32>)> = BTreeMap::new();
+            let mut waiting = vec![(*member, None)];
+            let mut found = None;
+            'search: while let Some((seeker, through)) = waiting.pop() {
+                for other in self.replaced[&seeker].iter().filter(free) {
+                    if asked_by.contains_key(other) {
+                        continue;
+                    }
+                    asked_by.insert(*other, (seeker, through));
+                    match taken.get(other) {
+                        Some(owner) => waiting.push((*owner, Some(*other))),
+                        None => {
+                            found = Some(*other);
+                            break 'search;
+                        }
+                    }
+                }
+            }
+            while let Some(other) = found {
+                let (seeker, through) = asked_by[&other];
+                taken.insert(other, seeker);
+                found = through;
             }
         }
         taken.len() as u64

@@ -31,6 +31,7 @@ pub mod patch;
 pub mod rays;
 pub mod set_up;
 pub mod sets;
+mod sets_lanes;
 pub mod tile;
 pub mod verdict;
 pub mod volume;

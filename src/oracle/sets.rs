@@ -2,12 +2,12 @@
 //! face the eye. What a method may leave out without losing anything is made of
 //! these, never of an algorithm under test.
 
-use super::volume::{Meets, OutCode, meets, out_code};
+use super::lanes::Kernel;
+use super::volume::Meets;
 use crate::culling::Removes;
 use crate::math::predicates::{Facing, Predicates};
 use crate::math::{DVec3, View};
 use crate::scene::Scene;
-use rayon::prelude::*;
 
 /// What is known of one triangle in one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,38 +63,7 @@ fn conditions(removes: Removes) -> (bool, bool) {
 
 /// Standing of every triangle of the scene, and the predicates that it took.
 pub fn standings(scene: &Scene, view: &View) -> (Vec<Standing>, Predicates) {
-    const CHUNK: usize = 8192;
-    let codes: Vec<OutCode> =
-        scene.positions.par_iter().with_min_len(CHUNK).map(|p| out_code(&view.planes, *p - view.eye)).collect();
-    let parts: Vec<(Vec<Standing>, Predicates)> = scene
-        .triangles
-        .par_chunks(CHUNK)
-        .enumerate()
-        .map(|(chunk, triangles)| {
-            let mut predicates = Predicates::default();
-            let standings = triangles
-                .iter()
-                .enumerate()
-                .map(|(i, vertices)| {
-                    let corners = vertices.map(|v| scene.positions[v as usize]);
-                    let relative = corners.map(|p| p - view.eye);
-                    let meets = meets(&view.planes, &relative, vertices.map(|v| codes[v as usize]));
-                    let faces = scene.two_sided[chunk * CHUNK + i]
-                        || faces_eye(view, &corners, &mut predicates) == Facing::Front;
-                    Standing { meets, faces }
-                })
-                .collect();
-            (standings, predicates)
-        })
-        .collect();
-    let mut all = Vec::with_capacity(scene.len());
-    let mut total = Predicates::default();
-    for (part, predicates) in parts {
-        all.extend(part);
-        total.calls += predicates.calls;
-        total.fallbacks += predicates.fallbacks;
-    }
-    (all, total)
+    super::sets_lanes::standings_on(Kernel::best(), scene, view)
 }
 
 /// Facing under the view's own rays: from the eye, or parallel.

@@ -28,7 +28,7 @@ pub struct OutCode {
 
 /// Distance error over `sum |n_i d_i| + |offset|`: one rounding each for the
 /// difference to the eye, the product and three sums, with room to spare.
-const DISTANCE_ERROR: f64 = 8.0 * f64::EPSILON / 2.0;
+pub(super) const DISTANCE_ERROR: f64 = 8.0 * f64::EPSILON / 2.0;
 /// Slack of clipping over the size of the coordinates. Each of up to six clips
 /// moves a vertex by at most 6 units of rounding and tests it with 8 more.
 const CLIP_SLACK: f64 = 128.0 * f64::EPSILON / 2.0;
@@ -46,13 +46,19 @@ pub fn out_code(planes: &[Plane], p: DVec3) -> OutCode {
     code
 }
 
+/// [`meets`] where the codes of the corners decide.
+#[inline]
+pub fn by_codes(codes: [OutCode; 3]) -> Option<Meets> {
+    if codes[0].certainly_out & codes[1].certainly_out & codes[2].certainly_out != 0 {
+        return Some(Meets::CertainlyNot);
+    }
+    codes.iter().any(|c| c.maybe_out == 0).then_some(Meets::Certainly)
+}
+
 /// Corners are relative to the eye; `codes` are theirs.
 pub fn meets(planes: &[Plane], corners: &[DVec3; 3], codes: [OutCode; 3]) -> Meets {
-    if codes[0].certainly_out & codes[1].certainly_out & codes[2].certainly_out != 0 {
-        return Meets::CertainlyNot;
-    }
-    if codes.iter().any(|c| c.maybe_out == 0) {
-        return Meets::Certainly;
+    if let Some(known) = by_codes(codes) {
+        return known;
     }
     let size = corners.iter().map(|c| c.abs().element_sum()).fold(0.0, f64::max)
         + planes.iter().map(|p| p.offset_m.abs()).fold(0.0, f64::max);

@@ -8,6 +8,7 @@
 
 use super::metrics::{self, Metric};
 use crate::math::Projection;
+use crate::record::{PathSource, SceneSource};
 use crate::registry::{Spec, format_sum, parse_sum};
 use crate::results::{RunResult, RunStatus, StudyResults};
 use crate::stats;
@@ -130,12 +131,27 @@ fn family(run: &RunResult, sweep: &Sweep, follows: bool) -> Vec<(String, String)
         parts.iter().map(strip).collect::<Vec<_>>().join("+")
     };
     let s = &run.spec;
-    // A member of a family is named by the values that set it apart.
-    let name = |name: &str, axis: &str| {
+    // Members of a family are named by the values that set them apart; without such a
+    // name, scenes of one generator that differ in the stressor alone are a family too.
+    let rest = |name: &str| {
         let value = format!("{key}=");
         let mut parts = name.split('@');
         let first = parts.next().unwrap_or_default().to_string();
-        parts.filter(|p| part != axis || !p.starts_with(&value)).fold(first, |name, p| format!("{name}@{p}"))
+        parts.filter(|p| !p.starts_with(&value)).fold(first, |name, p| format!("{name}@{p}"))
+    };
+    let scene = match &s.scene.source {
+        _ if part != "scene" => s.scene.name.clone(),
+        SceneSource::Generated(spec) if !s.scene.name.contains('@') => {
+            let placed = |own: &str, text: String| if own == key { String::new() } else { text };
+            let offset = placed("offset_m", format!("{:?}", s.scene.offset_m));
+            format!("{} {} {offset}", strip(spec), placed("scale", s.scene.scale.to_string()))
+        }
+        _ => rest(&s.scene.name),
+    };
+    let path = match &s.path.source {
+        _ if part != "path" => s.path.name.clone(),
+        PathSource::Generated(spec) if !s.path.name.contains('@') => strip(spec),
+        _ => rest(&s.path.name),
     };
     let mut camera = s.camera;
     match (key, part) {
@@ -145,8 +161,8 @@ fn family(run: &RunResult, sweep: &Sweep, follows: bool) -> Vec<(String, String)
         _ => {}
     }
     let mut out = vec![
-        ("scene".to_string(), name(&s.scene.name, "scene")),
-        ("path".into(), name(&s.path.name, "path")),
+        ("scene".to_string(), scene),
+        ("path".into(), path),
         ("camera".into(), serde_json::to_string(&camera).unwrap_or_default()),
         ("structure".into(), label("structure", &run.structure)),
         ("culling".into(), label("culling", &run.culling)),
