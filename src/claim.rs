@@ -131,6 +131,7 @@ pub static METRICS: &[Metric] = &[
     metric("p99_cull_ms", "ms", 1, "99th percentile of culling time a frame"),
     metric("peak_rss_mib", "MiB", 1, "peak resident memory of the trial, the scene included"),
     metric("potential_lost", "triangles", 0, "members of the exact set lost, seen or hidden"),
+    metric("potential_lost_share", "", 0, "members of the exact set lost, of all its members"),
     metric("prepare_ms", "ms", 1, "building the per-node columns of the tests"),
     metric("structure_mib", "MiB", 0, "bytes of the structure and of the tests' columns"),
     metric("total_cull_ms", "ms", 1, "culling time summed over the path"),

@@ -56,7 +56,7 @@ fn claim(mut f: Fields, id: Option<String>, names: &Names) -> Option<Claim> {
         _ => selection(&mut f, "denominator", names),
     };
     let for_each = for_each(&mut f);
-    let (published, published_for) = published(&mut f, for_each.as_deref(), names);
+    let (published, published_for) = published(&mut f, relation, for_each.as_deref(), names);
     let tolerance = f.number("tolerance", "a share from 0 to 10, such as 0.25", |x| (0.0..=10.0).contains(&x));
     let nothing_published = published.is_none() && published_for.is_empty();
     if let Some(stated @ (Relation::Ratio | Relation::Value)) = relation
@@ -133,11 +133,13 @@ fn for_each(f: &mut Fields) -> Option<String> {
 type Published = (Option<[f64; 2]>, BTreeMap<String, [f64; 2]>);
 
 /// `3.35`, `[1.71, 1.79]`, or a table of either by group.
-fn published(f: &mut Fields, for_each: Option<&str>, names: &Names) -> Published {
+fn published(f: &mut Fields, relation: Option<Relation>, for_each: Option<&str>, names: &Names) -> Published {
+    // A ratio of 0 says nothing; a share may well be 0.
+    let least = if relation == Some(Relation::Value) { 0.0 } else { f64::from_bits(1) };
     let mut by_group = BTreeMap::new();
     let Some(node) = f.get("published") else { return (None, by_group) };
     let Data::Table(table) = &node.data else {
-        let range = ratio(node);
+        let range = ratio(node, least);
         if range.is_none() {
             f.note(&node.place, "published", not_a_ratio());
         }
@@ -161,7 +163,7 @@ fn published(f: &mut Fields, for_each: Option<&str>, names: &Names) -> Published
             let e = Error::new(format!("no value of `{axis_name}` is labelled `{}`", key.name));
             f.note(&key.place, &path, e.help("use the label that `cullmark plan` prints, quoted"));
         }
-        match ratio(value) {
+        match ratio(value, least) {
             Some(range) => drop(by_group.insert(key.name.clone(), range)),
             None => f.note(&value.place, &path, not_a_ratio()),
         }
@@ -174,7 +176,7 @@ fn not_a_ratio() -> Error {
         .help("write published = 3.35, published = [1.71, 1.79] or published = { nucleus = 3.5 }")
 }
 
-fn ratio(node: &Node) -> Option<[f64; 2]> {
+fn ratio(node: &Node, least: f64) -> Option<[f64; 2]> {
     let number = |n: &Node| match n.data {
         Data::Int(i) => Some(i as f64),
         Data::Float(x) => Some(x),
@@ -185,5 +187,5 @@ fn ratio(node: &Node) -> Option<[f64; 2]> {
         Some([low, high]) => [number(low)?, number(high)?],
         Some(_) => return None,
     };
-    (range[0] > 0.0 && range[0] <= range[1] && range[1].is_finite()).then_some(range)
+    (range[0] >= least && range[0] <= range[1] && range[1].is_finite()).then_some(range)
 }

@@ -2,7 +2,7 @@
 
 use crate::claim::axis_value;
 use crate::manifest::axes::{AXES, axis};
-use crate::record::RunSpec;
+use crate::record::{RunSpec, cameras};
 use crate::registry::Spec;
 
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -63,6 +63,9 @@ pub fn labels(run: &RunSpec) -> Labels {
 pub fn label(axis: &str, value: &[Spec]) -> String {
     if value.is_empty() {
         return "none".to_string();
+    }
+    if axis == cameras::AXIS {
+        return value.iter().map(cameras::label).collect::<Vec<_>>().join("+");
     }
     let parts = AXES.iter().find(|a| a.name == axis).map(|a| (a.parts)()).unwrap_or_default();
     let short = |s: &Spec| match parts.iter().find(|p| p.name == s.kind) {

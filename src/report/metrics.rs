@@ -129,6 +129,9 @@ pub static METRICS: &[Metric] = &[
     metric("potential_lost", "triangles", Judged, "members of the exact set lost, seen or hidden", |r| {
         judged(r, |e| e.potential_lost as f64)
     }),
+    metric("potential_lost_share", "", Judged, "members of the exact set lost, of all its members", |r| {
+        share(r, |e| e.potential_lost as f64, |e| e.potential as f64, 1.0)
+    }),
     metric("prepare_ms", "ms", Measured, "building the per-node columns of the tests", |r| {
         r.trials.iter().map(|t| t.prepare_ns / 1e6).collect()
     }),

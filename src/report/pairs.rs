@@ -4,6 +4,7 @@ use super::labels;
 use super::metrics::{self, Metric};
 use crate::claim::{Claim, axis_value, selects};
 use crate::culling;
+use crate::record::cameras;
 use crate::registry::format_sum;
 use crate::results::{RunResult, RunStatus, StudyResults};
 use std::collections::{BTreeMap, BTreeSet};
@@ -84,6 +85,7 @@ pub fn group_name(results: &StudyResults, claim: &Claim, run: &RunResult) -> Str
         Some("scene") => labels::place(results, run),
         Some("culling") => run.culling.clone(),
         Some("structure") => run.structure.clone(),
+        Some(cameras::AXIS) => axis_value(&run.spec, cameras::AXIS).iter().map(cameras::label).collect(),
         Some(axis) => format_sum(&axis_value(&run.spec, axis)),
     }
 }

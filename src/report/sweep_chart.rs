@@ -85,7 +85,8 @@ fn scales(chart: &Chart) -> (Scale, Scale) {
 }
 
 fn axis_words(name: &str, unit: &str) -> String {
-    let name = name.replace(['.', '_'], " ");
+    // A unit that ends the name is said once.
+    let name = name.strip_suffix(unit).and_then(|n| n.strip_suffix('_')).unwrap_or(name).replace(['.', '_'], " ");
     if unit.is_empty() { name } else { format!("{name} ({unit})") }
 }
 

@@ -74,6 +74,7 @@ fn cameras_are_values_and_take_over_the_section() {
             "list × none × orthographic:far_m=7,near_m=0.5",
         ]
     );
+    assert_eq!(labels(&m.runs[1]).of("camera"), "perspective:fov_y_deg=1.33791,near_m=0.5", "as in a claim");
     assert_eq!(m.duplicates, 1, "the section's own camera, written twice");
     let number = |i: usize, name: &str| m.runs[i].number(name);
     assert_eq!((number(0, "camera.fov_y_deg"), number(2, "camera.fov_y_deg")), (Some(0.01), Some(179.0)));

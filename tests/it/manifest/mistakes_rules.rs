@@ -161,6 +161,15 @@ fn mistakes_in_claims_name_place_and_remedy() {
                 "[1.71, 1.79]",
             ),
             (
+                // A share may be 0, a ratio not.
+                own(format!("{metric}{num}{den}relation = \"ratio\"\npublished = [0, 3]")),
+                23,
+                13,
+                "claim.0.published",
+                "must be a ratio",
+                "[1.71, 1.79]",
+            ),
+            (
                 own(format!("{metric}{num}{den}relation = \"<\"\npublished = {{ a = 3 }}")),
                 23,
                 13,

@@ -100,4 +100,12 @@ fn a_claim_pairs_what_takes_no_arithmetic_with_every_arithmetic() {
     claim.numerator = fixture::select(&[("arithmetic", "f32_world")]);
     claim.denominator = fixture::select(&[("arithmetic", "f32_relative"), ("culling", "frustum")]);
     assert_eq!(judge(&results, &claim).groups.len(), 3);
+    // Cameras go by the labels that the plan prints.
+    claim.for_each = Some("camera".into());
+    claim.numerator = fixture::select(&[("arithmetic", "f64")]);
+    claim.denominator.clear();
+    claim.relation = Relation::Value;
+    claim.published = Some([0.0, 1e9]);
+    let names: Vec<String> = judge(&study(), &claim).groups.into_iter().map(|g| g.name).collect();
+    assert_eq!(names, ["perspective", "perspective:aspect=1.5,fov_y_deg=2.5"]);
 }
