@@ -187,6 +187,9 @@ pub struct RunSpec {
     pub model: TimeModel,
 }
 
+/// Raised when truth or its judgement changes: what older ones said is asked again.
+pub const ORACLE_REVISION: u32 = 3;
+
 impl RunSpec {
     /// Hash of all that determines the submitted sets.
     pub fn answer_id(&self) -> String {
@@ -224,9 +227,9 @@ impl RunSpec {
         hash_json(&(self.answer_id(), machine_class, &self.protocol, self.series))
     }
 
-    /// Identity of a judgement: the answer and the accuracy asked of it.
+    /// Identity of a judgement: the answer, the accuracy asked of it, and who judges.
     pub fn judgement_id(&self) -> String {
-        hash_json(&(self.answer_id(), &self.accuracy))
+        hash_json(&(self.answer_id(), &self.accuracy, ORACLE_REVISION))
     }
 
     /// Truth is shared by all methods on the same scene, path and camera.

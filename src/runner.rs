@@ -239,6 +239,10 @@ pub fn time_trial(spec: &RunSpec, cache: &Path) -> Result<TrialRecord> {
             }
         }
         setup.check()?;
+        if tally != work.iter().map(|w| w.tally).sum() {
+            return Err(Error::new(format!("pass {pass} counted other work than the first pass"))
+                .help("the method counts by what it did before: `reset` forgets to clear it"));
+        }
         if pass >= protocol.warmup_passes {
             switches += machine::involuntary_switches() - switches_before;
             passes_ns.push(times_ns);

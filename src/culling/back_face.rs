@@ -221,7 +221,9 @@ impl Test for BackFace {
                             let judged = eye.judge(&triangles[(w + i) * WORD + bit]);
                             *word &= !(u64::from(judged == Fixed::Back) << bit);
                             if judged == Fixed::Overflow {
-                                failure.get_or_insert_with(|| OVERFLOW.to_string());
+                                let parallel = matches!(eye, FixedEye::Direction(_));
+                                failure
+                                    .get_or_insert_with(|| if parallel { OVERFLOW_PARALLEL } else { OVERFLOW }.into());
                             }
                         }
                     }
@@ -241,6 +243,9 @@ impl Test for BackFace {
 
 const OVERFLOW: &str = "back_face: a triangle lies more than 32,768 m from the camera, which Q15.16 cannot hold; \
                         choose another arithmetic, or put `frustum` with a far plane before it";
+const OVERFLOW_PARALLEL: &str = "back_face: a triangle has an edge of more than 32,768 m, or lies 67,000 km from the \
+                                 scene's middle, which Q15.16 cannot hold; choose another arithmetic, or a smaller \
+                                 `scale` for the scene";
 
 /// Numbers of the set bits, ascending.
 fn bits_of(mut word: u64) -> impl Iterator<Item = usize> {

@@ -142,7 +142,6 @@ pub struct Fixed {
 struct Overflow {
     node: u32,
     distance_m: f64,
-    judgements: u64,
 }
 
 impl Default for Fixed {
@@ -154,15 +153,14 @@ impl Default for Fixed {
 impl Fixed {
     #[cold]
     fn report(&mut self, hierarchy: &Hierarchy, block: u32, lanes: u8) {
-        let first = self.overflow.get_or_insert_with(|| {
+        self.overflow.get_or_insert_with(|| {
             let lane = lanes.trailing_zeros();
             let b = hierarchy.bounds[block as usize].get(lane as usize);
             let eye = DVec3::from(self.frame.eye.map(|q| q as f64)) / f64::from(1 << fixed::LENGTH_BITS);
             let (lo, hi) = (b.lo.as_dvec3(), b.hi.as_dvec3());
             let reach = [lo - eye, hi - eye, lo, hi].map(|v| v.abs().max_element()).into_iter().fold(0.0, f64::max);
-            Overflow { node: block * LANES as u32 + lane, distance_m: reach, judgements: 0 }
+            Overflow { node: block * LANES as u32 + lane, distance_m: reach }
         });
-        first.judgements += u64::from(lanes.count_ones());
     }
 }
 
@@ -202,10 +200,10 @@ impl PlaneTest for Fixed {
     }
 
     fn failure(&self) -> Option<String> {
-        let Overflow { node, distance_m, judgements } = self.overflow?;
+        let Overflow { node, distance_m } = self.overflow?;
         Some(format!(
-            "fixed_q16 reaches {:.0} m, but the box of node {node} is {distance_m:.0} m away ({judgements} such \
-             judgements in the pass): choose a smaller `scale` for the scene, or another arithmetic for it",
+            "fixed_q16 reaches {:.0} m, but the box of node {node} is {distance_m:.0} m away: choose a smaller \
+             `scale` for the scene, or another arithmetic for it",
             fixed::REACH_M
         ))
     }

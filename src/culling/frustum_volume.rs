@@ -8,9 +8,10 @@ use crate::math::{DVec3, View};
 /// a finite far plane, far corners; otherwise the corner rays.
 #[derive(Debug, Clone, Default)]
 pub struct Volume {
-    /// Relative to the eye.
-    points: Vec<DVec3>,
-    directions: Vec<DVec3>,
+    /// Relative to the eye; with each what its coordinates were added up from, which
+    /// may be far larger than they are.
+    points: Vec<[DVec3; 2]>,
+    directions: Vec<[DVec3; 2]>,
     /// Eye relative to the scene's origin.
     eye: DVec3,
 }
@@ -20,15 +21,18 @@ impl Volume {
         let rays = view.corner_rays();
         let (w, h) = (view.right * view.half_width, view.up * view.half_height);
         let window = [-w - h, w - h, w + h, h - w];
-        let corner = |i: usize, depth: f64| {
-            if view.is_perspective() { rays[i] * depth } else { window[i] + view.forward * depth }
+        let beside = w.abs() + h.abs();
+        let corner = |i: usize, depth: f64| match view.is_perspective() {
+            true => [rays[i] * depth, (view.forward.abs() + beside) * depth],
+            false => [window[i] + view.forward * depth, view.forward.abs() * depth + beside],
         };
         let mut volume = Volume { eye: view.eye - origin, ..Default::default() };
         for (i, ray) in rays.iter().enumerate() {
             volume.points.push(corner(i, view.camera.near_m));
             match view.camera.far_m {
                 Some(far_m) => volume.points.push(corner(i, far_m)),
-                None => volume.directions.push(*ray),
+                None if view.is_perspective() => volume.directions.push([*ray, view.forward.abs() + beside]),
+                None => volume.directions.push([*ray; 2]),
             }
         }
         volume
@@ -40,8 +44,8 @@ impl Volume {
         const GUARD: f64 = 64.0 * f64::EPSILON;
         let at_eye = space.normal.dot(self.eye) + space.offset_m;
         let scale = space.normal.abs().dot(self.eye.abs()) + space.offset_m.abs();
-        let below = |p: &DVec3, at_eye: f64, scale: f64| {
-            space.normal.dot(*p) + at_eye < -GUARD * (space.normal.abs().dot(p.abs()) + scale)
+        let below = |[p, parts]: &[DVec3; 2], at_eye: f64, scale: f64| {
+            space.normal.dot(*p) + at_eye < -GUARD * (space.normal.abs().dot(parts.abs()) + scale)
         };
         self.points.iter().all(|p| below(p, at_eye, scale)) && self.directions.iter().all(|r| below(r, 0.0, 0.0))
     }

@@ -271,6 +271,21 @@ pub struct Tally {
     pub fallbacks_exact: u64,
 }
 
+impl std::iter::Sum for Tally {
+    fn sum<I: Iterator<Item = Tally>>(tallies: I) -> Tally {
+        tallies.fold(Tally::default(), |a, b| Tally {
+            nodes_visited: a.nodes_visited + b.nodes_visited,
+            lane_tests: a.lane_tests + b.lane_tests,
+            plane_tests: a.plane_tests + b.plane_tests,
+            mask_tests: a.mask_tests + b.mask_tests,
+            triangle_tests: a.triangle_tests + b.triangle_tests,
+            predicates: a.predicates + b.predicates,
+            fallbacks_f64: a.fallbacks_f64 + b.fallbacks_f64,
+            fallbacks_exact: a.fallbacks_exact + b.fallbacks_exact,
+        })
+    }
+}
+
 impl Tally {
     /// Name, unit and value of every counter: counters are data.
     pub fn named(&self) -> [(&'static str, &'static str, u64); 8] {

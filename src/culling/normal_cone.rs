@@ -8,7 +8,7 @@
 //!
 //! - `sphere`: `d.axis >= L sin a + R`, meshoptimizer's rule without a square root of its
 //!   own. It implies the above where `a + b <= 90 degrees`, and it implies that too.
-//! - `tight`: the above as it stands, `cos a (d.axis) - sin a sqrt(L^2 - (d.axis)^2) >= R`.
+//! - `tight`: the above as it stands, `cos a (d.axis) - sin a |d x axis| >= R`.
 //! - `apex`: in place of the sphere the apex of a cone that lies behind every triangle's
 //!   plane, where `R` is 0 but for rounding.
 //!
@@ -27,7 +27,7 @@ use rayon::prelude::*;
 pub const ENTRY: Entry<dyn Test> = Entry {
     name: "normal_cone",
     about: "skip nodes whose cone of normals turns away from the eye (Shirmun & Abi-Ezzi 1993)",
-    revision: 1,
+    revision: 2,
     params: &[Param {
         name: "form",
         default: Allowed::Choice(&["sphere", "tight", "apex"]),
@@ -172,7 +172,8 @@ impl NormalCone {
         let (along, length, radius) = (d.dot(axis), d.length(), f64::from(cones.radius_m[lane]));
         let needed = radius + GUARD * (length + radius);
         if self.form == Form::Tight {
-            let across = (length * length - along * along).max(0.0).sqrt();
+            // Not sqrt(L^2 - along^2): the rounded axis is no unit vector, and near it that cancels.
+            let across = d.cross(axis).length();
             along > 0.0 && (1.0 - sin_angle * sin_angle).sqrt() * along - sin_angle * across >= needed
         } else {
             along >= sin_angle * length + needed

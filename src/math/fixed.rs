@@ -75,11 +75,12 @@ impl FixedPlane {
         let slack = (d.abs() + plane.offset_m.abs() + rest.abs().element_sum()) * (-50f64).exp2() + (-100f64).exp2();
         let unit = ((LENGTH_BITS + NORMAL_BITS) as f64).exp2();
         let cap = 2f64.powi(61);
-        let whole = |x: f64| if x.is_nan() { cap } else { x.clamp(-cap, cap) };
+        // No number: neither outside nor inside.
+        let whole = |x: f64, none: f64| if x.is_nan() { none } else { x.clamp(-cap, cap) } as i64;
         FixedPlane {
             normal: plane.normal.to_array().map(direction),
-            d_out: whole(((d + slack) * unit).ceil()) as i64,
-            d_in: whole(((d - slack) * unit).floor()) as i64,
+            d_out: whole(((d + slack) * unit).ceil(), cap),
+            d_in: whole(((d - slack) * unit).floor(), -cap),
         }
     }
 

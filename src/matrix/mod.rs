@@ -7,6 +7,7 @@ pub mod plan;
 mod sweeps;
 
 use crate::claim::selects;
+use crate::culling::knows_arithmetic;
 use crate::error::Error;
 use crate::manifest::Manifest;
 use crate::manifest::axes::AXES;
@@ -174,6 +175,15 @@ fn build(manifest: &Manifest, setting: &Setting, pool: &Pool, cell: &Cell) -> Ru
     }
     for arithmetic in named["culling"].iter().filter_map(stated_arithmetic) {
         revisions.insert(format!("{}.{arithmetic}", arithmetic::NAME), arithmetic.revision());
+    }
+    // The usual arithmetic is not named either; its first revision is in no id.
+    let usual = Arithmetic::default();
+    let takes_usual = |part: &&Spec| knows_arithmetic(&part.kind) && stated_arithmetic(part).is_none();
+    if usual.revision() > 1
+        && !others.contains_key(arithmetic::NAME)
+        && named["culling"].iter().any(|p| takes_usual(&p))
+    {
+        revisions.insert(format!("{}.{usual}", arithmetic::NAME), usual.revision());
     }
     let camera = match others.get(cameras::AXIS) {
         Some(spec) => cameras::camera_of(spec).expect("the manifest checked its cameras"),

@@ -8,7 +8,7 @@ use super::bits::BitSet;
 use super::footprint::Lens;
 use super::image::{ANY, BACKGROUND, Grid, Run, TileRect};
 use super::outline::{Outline, Screen};
-use super::volume::triangle_meets;
+use super::volume::{Meets, triangle_meets};
 use super::{FrameTruth, Standing};
 use crate::culling::Removes;
 use crate::math::{DVec3, View};
@@ -87,7 +87,8 @@ pub fn losses(scene: &Scene, view: &View, truth: &FrameTruth, submitted: &Submit
     // Image space.
     let lens = Lens::new(view, truth.grid);
     let screen = Screen::new(view);
-    let judge = SampleJudge { scene, view, truth, lens: &lens, screen, submitted, lost_pieces: &lost_pieces };
+    let (lens, standings) = (&lens, &standings[..]);
+    let judge = SampleJudge { scene, view, truth, standings, lens, screen, submitted, lost_pieces: &lost_pieces };
     let mut found = Findings::new(truth.grid);
     for (index, tile) in (0u32..).zip(&truth.tiles) {
         let rect = truth.grid.tile(index);
@@ -160,6 +161,7 @@ struct SampleJudge<'a> {
     scene: &'a Scene,
     view: &'a View,
     truth: &'a FrameTruth,
+    standings: &'a [Standing],
     lens: &'a Lens,
     screen: Screen,
     submitted: &'a Submitted,
@@ -247,7 +249,7 @@ impl SampleJudge<'_> {
         }
         let t = run.winner - 1;
         debug_assert!((t as usize) < self.scene.len());
-        if self.drawn_whole(t) {
+        if self.drawn_whole(t) || !self.owed(t) {
             return;
         }
         if run.alternate == ANY {
@@ -296,13 +298,19 @@ impl SampleJudge<'_> {
     fn witnesses(&self, found: &mut Findings) -> u64 {
         let drawn = |t: &u32| self.submitted.triangles.contains(*t);
         let mut lost = 0;
-        for w in self.truth.bracket.witnesses.iter().filter(|w| !drawn(&w.triangle)) {
+        for w in self.truth.bracket.witnesses.iter().filter(|w| !drawn(&w.triangle) && self.owed(w.triangle)) {
             match w.tied.iter().find(|t| drawn(t)) {
                 Some(other) => found.stands_in(self.submitted, w.triangle, *other),
                 None => lost += u64::from(found.seen_lost.insert(w.triangle)),
             }
         }
         lost
+    }
+
+    /// A sample at the very boundary of the volume proves nothing of a triangle that
+    /// rounding alone may have put inside it.
+    fn owed(&self, t: u32) -> bool {
+        self.standings[t as usize].meets == Meets::Certainly
     }
 
     fn drawn_whole(&self, t: u32) -> bool {

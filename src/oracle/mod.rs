@@ -51,8 +51,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sets::Standing;
 
-/// Raised when truth changes: part of every cached file.
-pub const REVISION: u32 = 2;
+/// Part of every cached file.
+pub use crate::record::ORACLE_REVISION as REVISION;
 
 /// Truth of the judged frames of one scene, camera and path.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -32,7 +32,8 @@ pub struct FrameErrors {
     pub samples: u64,
     /// Exact set the method is entitled to reduce to (frustum, facing).
     pub potential: u64,
-    /// |V_lo minus S|: proved false culls that a sample sees.
+    /// Proved false culls: members of V_lo, seen by a sample or by a witness ray alone, in
+    /// whose place neither they nor an equal surface were submitted.
     pub false_culls: u64,
     /// Members of the exact set lost, seen or hidden (object space).
     pub potential_lost: u64,

@@ -181,30 +181,18 @@ pub fn rank(points: &[(Spread, Spread)]) -> Vec<(Standing, Option<usize>)> {
 }
 
 /// Over-submission between its bounds, mean over judged frames: |S| / |V_hi|, and
-/// |S| / |V_lo|. The lower is unknown where nothing was bracketed. The truth is the
+/// |S| / |V_lo|. The lower is unknown where no hiding was proved. The truth is the
 /// same for all methods of a scene, so these bounds are no noise between them.
 pub fn over_submission(run: &RunResult) -> Option<(Option<f64>, f64)> {
-    let mean = |of: &dyn Fn(&FrameErrors) -> f64| {
-        let finite: Vec<f64> = run.errors.iter().map(of).filter(|v| v.is_finite()).collect();
-        (!finite.is_empty()).then(|| stats::mean(&finite))
-    };
-    let at_most = mean(&FrameErrors::over_submission)?;
-    let bracketed = run.errors.iter().any(|e| e.visible_hi > 0);
-    let at_least = mean(&|e| if e.submitted == 0 { 1.0 } else { e.submitted as f64 / e.visible_hi as f64 });
-    Some((at_least.filter(|_| bracketed), at_most))
-}
-
-/// The class that the judged frames show, for want of a better: what they do not refute.
-pub fn observed(run: &RunResult) -> Option<Class> {
-    if run.errors.is_empty() {
+    // Frames that show nothing have no upper bound: both means leave them out.
+    let frames: Vec<&FrameErrors> = run.errors.iter().filter(|e| e.over_submission().is_finite()).collect();
+    let mean = |of: &dyn Fn(&FrameErrors) -> f64| stats::mean(&frames.iter().map(|e| of(e)).collect::<Vec<_>>());
+    if frames.is_empty() {
         return None;
     }
-    let any = |of: fn(&FrameErrors) -> u64| run.errors.iter().any(|e| of(e) > 0);
-    Some(match (any(|e| e.false_culls), any(|e| e.potential_lost)) {
-        (true, _) => Class::Aggressive,
-        (false, true) => Class::SampleConservative,
-        (false, false) => Class::Conservative,
-    })
+    let bracketed = run.spec.accuracy.hiding_cells > 0;
+    let least = |e: &FrameErrors| if e.submitted == 0 { 1.0 } else { e.submitted as f64 / e.visible_hi as f64 };
+    Some((bracketed.then(|| mean(&least)), mean(&FrameErrors::over_submission)))
 }
 
 #[cfg(test)]

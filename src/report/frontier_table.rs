@@ -1,7 +1,7 @@
 //! The fronts of a study as tables: one for any two metrics, one for the report.
 
 use super::figure::Figure;
-use super::frontier::{Front, Gap, Point, fronts, observed, over_submission};
+use super::frontier::{Front, Gap, Point, fronts, over_submission};
 use super::labels::Grid;
 use super::metrics::{Kind, Metric, known};
 use super::rows::may_lose;
@@ -200,5 +200,5 @@ fn classes(run: &RunResult) -> [Cell; 2] {
     if let (true, Cell::Text(text)) = (may_lose(run), &mut declared) {
         text.insert_str(0, "† ");
     }
-    [declared, word(observed(run))]
+    [declared, word(run.observed)]
 }

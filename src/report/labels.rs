@@ -2,7 +2,9 @@
 
 use super::style::{Legend, Look};
 use crate::claim::axis_value;
-use crate::registry::format_sum;
+use crate::culling;
+use crate::math::arithmetic::NAME;
+use crate::registry::{Spec, format_sum};
 use crate::results::{RunResult, StudyResults};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,6 +19,18 @@ pub struct Names {
     pub culling: String,
     /// `octree:depth=4 × frustum`: structure, culling, then the rest.
     pub combination: String,
+}
+
+/// The arithmetic in which the run's tests are evaluated: what their parts state, else
+/// the axis' value; `takes none` where no part knows arithmetics.
+pub fn arithmetic(run: &RunResult) -> String {
+    let parts = run.spec.culling.iter().filter(|part| culling::knows_arithmetic(&part.kind));
+    let of = |part: &Spec| match part.params.get(NAME) {
+        Some(stated) => stated.to_string(),
+        None => format_sum(&axis_value(&run.spec, NAME)),
+    };
+    let all: BTreeSet<String> = parts.map(of).collect();
+    if all.is_empty() { "takes none".into() } else { all.into_iter().collect::<Vec<_>>().join("+") }
 }
 
 /// Names of all runs, in their order. A walk is named only where runs of the

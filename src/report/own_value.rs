@@ -2,8 +2,9 @@
 
 use super::claims::{Group, Ratio, Verdict, decide, stated};
 use super::metrics::{self, Kind, Metric};
-use super::pairs::group_name;
+use super::{labels, pairs::group_name};
 use crate::claim::{Claim, Relation, selects};
+use crate::math::arithmetic;
 use crate::results::{RunResult, RunStatus, StudyResults};
 use crate::stats;
 
@@ -11,7 +12,10 @@ use crate::stats;
 pub fn groups(results: &StudyResults, claim: &Claim) -> Vec<Group> {
     let mut named: Vec<(String, Vec<&RunResult>)> = Vec::new();
     for run in results.runs.iter().filter(|r| selects(&claim.numerator, &r.spec)) {
-        let name = group_name(results, claim, run);
+        let name = match claim.for_each.as_deref() {
+            Some(arithmetic::NAME) => labels::arithmetic(run),
+            _ => group_name(results, claim, run),
+        };
         match named.iter_mut().find(|(n, _)| *n == name) {
             Some((_, runs)) => runs.push(run),
             None => named.push((name, vec![run])),

@@ -251,6 +251,9 @@ impl Repeatability<'_> {
         }
         out.push(match self.differences.len() as u64 {
             0 if self.numbers_compared == 0 => "Nothing counted could be compared.".into(),
+            0 if self.hashes_compared == 0 => {
+                format!("All {} are identical.", count(self.numbers_compared, "counted number", "counted numbers"))
+            }
             0 => format!(
                 "All {} and the hashes of all {} are identical.",
                 count(self.numbers_compared, "counted number", "counted numbers"),

@@ -7,8 +7,8 @@
 //! its class is no gap: its x is kept.
 
 use super::metrics::{self, Metric};
-use crate::math::Projection;
-use crate::record::{PathSource, SceneSource};
+use crate::claim::axis_value;
+use crate::record::{PathSource, SceneSource, cameras};
 use crate::registry::{Spec, format_sum, parse_sum};
 use crate::results::{RunResult, RunStatus, StudyResults};
 use crate::stats;
@@ -107,9 +107,9 @@ fn by_value(run: &RunResult, by: &str) -> String {
         "structure" => run.structure.clone(),
         "culling" => run.culling.clone(),
         "walk" => run.walk.clone(),
-        // A run that names none computes in the default.
-        crate::math::arithmetic::NAME => run.spec.arithmetic().map_or_else(|e| e.to_string(), |a| a.name().to_string()),
-        axis => run.spec.axes.get(axis).map_or_else(|| "default".into(), Spec::to_string),
+        crate::math::arithmetic::NAME => super::labels::arithmetic(run),
+        cameras::AXIS => axis_value(&run.spec, cameras::AXIS).iter().map(cameras::label).collect(),
+        axis => format_sum(&axis_value(&run.spec, axis)),
     }
 }
 
@@ -153,17 +153,14 @@ fn family(run: &RunResult, sweep: &Sweep, follows: bool) -> Vec<(String, String)
         PathSource::Generated(spec) if !s.path.name.contains('@') => strip(spec),
         _ => rest(&s.path.name),
     };
-    let mut camera = s.camera;
-    match (key, part) {
-        ("fov_y_deg", "camera") => camera.projection = Projection::Perspective { fov_y_rad: 0.0 },
-        ("near_m", "camera") => camera.near_m = 0.0,
-        ("far_m", "camera") => camera.far_m = None,
-        _ => {}
+    let mut camera = cameras::spec_of(&s.camera);
+    if part == cameras::AXIS {
+        camera.params.remove(key);
     }
     let mut out = vec![
         ("scene".to_string(), scene),
         ("path".into(), path),
-        ("camera".into(), serde_json::to_string(&camera).unwrap_or_default()),
+        (cameras::AXIS.into(), cameras::label(&camera)),
         ("structure".into(), label("structure", &run.structure)),
         ("culling".into(), label("culling", &run.culling)),
         ("walk".into(), label("walk", &run.walk)),

@@ -133,6 +133,46 @@ fn cones_and_masks_by_node_skip_no_front_face() {
     }
 }
 
+/// The rounded axis is no unit vector: what is left of L^2 - (d.axis)^2 close to it is rounding.
+#[test]
+fn an_eye_on_the_axis_of_a_cone_sees_all_its_fronts() {
+    let a = [
+        [87.70848625391216, 464.8293908280583, -162.01808189663137],
+        [85.10807770123179, 466.71470087217403, -157.93354013571093],
+        [82.5884231906232, 465.6502406489592, -162.35148825450582],
+    ]
+    .map(DVec3::from_array);
+    let b = [
+        [-2.144575448880367, 0.7517110736157339, 1.0419820564016697],
+        [1.9164719814158477, 1.592399925131716, -0.20346405797712852],
+        [0.22810346746452037, -2.3441109987474493, -0.8385179984245413],
+    ]
+    .map(DVec3::from_array);
+    let mut scene = soup(1, 3, 1.0, 1.0);
+    for (t, corners) in [a, a.map(|c| -c), b].into_iter().enumerate() {
+        for (v, c) in scene.triangles[t].into_iter().zip(corners) {
+            scene.positions[v as usize] = c;
+        }
+    }
+    let found = DVec3::new(625.090309814735, 693.5646175163832, 786.1873675930701);
+    let mut rng = Rng::new(115);
+    let mut views = Vec::new();
+    for i in 0..4000 {
+        // Around the eye that was lost once, and around the axis: all that is close to either.
+        let mut pose = rng.pose(1.0);
+        pose.eye = found * rng.range(0.5, 2.0) + rng.cube(10f64.powi(-(i % 9)));
+        if i == 0 {
+            pose.eye = found;
+        }
+        views.push(View::new(&camera(60.0, 1.5), &pose));
+    }
+    for h in [list(&scene, 3), list(&scene, 1)] {
+        for culling in CONES {
+            assert_eq!(skipped(&scene, &h, culling, &views).1, 0, "{culling}");
+        }
+    }
+}
+
 /// C5.2 and C3.4: what masks of the whole view, masks by node and cones skip.
 #[test]
 fn cones_are_best_on_coherent_clusters_and_rays_to_nodes_far_better_than_those_of_the_view() {

@@ -3,7 +3,7 @@
 use super::{accuracy, ahead, empty, pose, truth_of, wall};
 use crate::common::soup;
 use cullmark::culling::{Class, Removes};
-use cullmark::math::{Camera, DVec3, View};
+use cullmark::math::{Camera, DVec3, Pose, View};
 use cullmark::oracle::volume::Meets;
 use cullmark::oracle::{BitSet, FrameTruth, Submitted, judge_frame, verdict};
 use cullmark::scene::Scene;
@@ -155,4 +155,21 @@ fn a_piece_of_a_split_triangle_is_missed_where_it_would_be_seen() {
     assert!((half.false_cull_pixels as f64 - pixels).abs() < 0.1 * pixels, "half of the triangle's pixels");
     let outside = [a, b, mid].map(|p| p + DVec3::new(0.0, 50.0, 0.0));
     assert_eq!(judge(vec![(0, outside)]).potential_lost, 0, "a piece outside may go");
+}
+
+#[test]
+fn what_rounding_alone_puts_inside_the_volume_is_not_owed() {
+    // The wall lies 1.4e-17 m short of the near plane, and its inverse depth rounds to the plane's own.
+    let mut scene = empty();
+    let p = |y: f64, z: f64| DVec3::new(0.125, y, z);
+    super::push(&mut scene, [p(-1.0, -1.0), p(1.0, -1.0), p(0.0, 1.0)], true, true);
+    let at = Pose { eye: DVec3::new(0.02500000000000001, 0.0, 0.0), ..ahead() };
+    let camera = Camera::default();
+    let truth = truth_of(&scene, &camera, at, &accuracy(64, 36, 1));
+    assert!(!truth.visible.is_empty(), "samples see it");
+    assert_eq!(truth.standings()[0].meets, Meets::Uncertain);
+    let case = Case { view: View::new(&camera, &at), scene, truth };
+    let errors = case.judge(BitSet::new(1), FRUSTUM);
+    assert_eq!((errors.false_culls, errors.potential_lost, errors.false_cull_pixels), (0, 0, 0));
+    assert_eq!(verdict(Class::Conservative, &[errors]), None);
 }

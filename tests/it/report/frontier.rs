@@ -2,7 +2,8 @@
 
 use super::fixture;
 use cullmark::culling::Class;
-use cullmark::report::frontier::{Standing, fronts};
+use cullmark::record::FrameErrors;
+use cullmark::report::frontier::{Standing, fronts, over_submission};
 use cullmark::report::frontier_table::{X, Y, only, report, table, text};
 use cullmark::report::labels::Grid;
 use cullmark::report::metrics::known;
@@ -135,6 +136,10 @@ fn over_submission_is_bracketed_where_hiding_was() {
         for e in &mut run.errors {
             e.visible_hi = 2 * e.visible;
         }
+        // A frame that shows nothing has no upper bound, and counts in neither.
+        let nothing = FrameErrors { frame: 99, submitted: 1000, visible_hi: 5, ..Default::default() };
+        run.errors.push(nothing);
+        run.spec.accuracy.hiding_cells = 64;
     }
     let grid = Grid::of(&results);
     let axes = (known(X), known("over_submission"));
@@ -148,6 +153,10 @@ fn over_submission_is_bracketed_where_hiding_was() {
         let (most, least) = (number(&row[at("over_submission")]), number(&row[at("over_submission at least")]));
         assert!((most / least - 2.0).abs() < 1e-9, "{most} and {least}");
     }
+    for run in &mut results.runs {
+        run.spec.accuracy.hiding_cells = 0;
+    }
+    assert!(results.runs.iter().all(|r| over_submission(r).unwrap().0.is_none()), "nothing was proved hidden");
 }
 
 #[test]

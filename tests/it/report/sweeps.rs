@@ -1,6 +1,7 @@
 //! Errors against stressors: which runs meet on a line, zeros, what failed, growth.
 
 use super::fixture;
+use cullmark::math::Projection;
 use cullmark::record::SceneSource;
 use cullmark::registry::{Spec, Value};
 use cullmark::report::sweeps::chart;
@@ -91,6 +92,23 @@ fn further_axes_make_panels_and_equal_places_a_median() {
     let (middle, low, high) = p.value.unwrap();
     assert_eq!(p.runs.len(), 2);
     assert!((high / low - 3.0).abs() < 1e-9 && (middle / low - 2.0).abs() < 1e-9, "{:?}", p.value);
+}
+
+#[test]
+fn cameras_without_the_stressor_make_panels() {
+    let mut results = stressed(&["frustum"]);
+    let scene = results.runs[0].spec.scene.clone();
+    for (i, run) in results.runs.iter_mut().enumerate() {
+        run.spec.camera.projection = Projection::Perspective { fov_y_rad: 0.1 * (1 + i % 7) as f64 };
+        run.spec.camera.aspect = if i % 2 == 0 { 4.0 / 3.0 } else { 16.0 / 9.0 };
+        run.spec.scene = scene.clone();
+    }
+    results.sweeps[0].x = "camera.fov_y_deg".into();
+    let c = chart(&results, &results.sweeps[0]).unwrap();
+    assert_eq!(
+        c.panels.iter().map(|p| p.title.as_str()).collect::<Vec<_>>(),
+        ["perspective:aspect=1.33333", "perspective"]
+    );
 }
 
 #[test]
