@@ -120,12 +120,11 @@ fn axes(figure: &mut Figure, chart: &Chart, plot: Rect, (x, y): (&Scale, &Scale)
 
 /// The title of a panel, cut where it would leave it: the table has all of it.
 fn head(figure: &mut Figure, plot: Rect, title: &str) {
+    let fits = |text: &str| font::width(text, facets::HEAD, true) <= plot.w;
     let mut text = title.to_string();
-    while font::width(&text, facets::HEAD, true) > plot.w && text.pop().is_some() {
-        if font::width(&format!("{text}…"), facets::HEAD, true) <= plot.w {
-            text.push('…');
-            break;
-        }
+    if !fits(&text) {
+        while !fits(&format!("{text}…")) && text.pop().is_some() {}
+        text.push('…');
     }
     if !text.is_empty() {
         facets::panel_head(figure, plot, &text, "");

@@ -193,8 +193,14 @@ fn titles(families: &[&Vec<(String, String)>]) -> Vec<String> {
     let varies = |axis: &str, value: &str| {
         families.iter().any(|f| f.iter().find(|(a, _)| a == axis).is_none_or(|(_, v)| v != value))
     };
+    let value = |f: &Vec<(String, String)>, axis: &str| f.iter().find(|(a, _)| a == axis).map(|(_, v)| v.clone());
+    // The walk that goes with a structure says nothing beside it.
+    let own = families.iter().all(|f| {
+        families.iter().all(|g| value(f, "structure") != value(g, "structure") || value(f, "walk") == value(g, "walk"))
+    });
     let of = |f: &Vec<(String, String)>| {
-        let parts = f.iter().filter(|(axis, value)| varies(axis, value)).map(|(_, value)| value.as_str());
+        let told = |axis: &str, value: &str| varies(axis, value) && !(own && axis == "walk");
+        let parts = f.iter().filter(|(axis, value)| told(axis, value)).map(|(_, value)| value.as_str());
         parts.collect::<Vec<_>>().join(" × ")
     };
     families.iter().map(|f| of(f)).collect()
