@@ -12,7 +12,8 @@
 //! - Triangles that hide nothing (`occluder == false`) come in a second pass: a
 //!   sample sees each of them that no hiding triangle covers.
 //!
-//! Class: sample-exact. Every id in it has a ray that hits the triangle first.
+//! Class: sample-exact but for the rounding of f64: along an edge, or where a surface
+//! is seen within some 1e-8 rad of edge-on, a sample may go to the neighbour.
 //! Nothing depends on the number of threads, or on the instruction set.
 
 pub use super::tile::TIE;

@@ -1,6 +1,7 @@
 //! The oracle: ground truth of a frame, and the judgement of what was submitted.
 //!
-//! Lower bounds on what a method must submit, all proved:
+//! Lower bounds on what a method must submit. The first and the last carry bounds of
+//! their rounding; the item buffer is f64 and as good as that along edges:
 //! - the exact sets ([`sets`]): triangles that certainly meet the view volume and
 //!   face the eye, seen or hidden;
 //! - the item buffer ([`item_buffer`]): triangles that a sample ray hits first;

@@ -66,11 +66,11 @@ fn add(out: &mut BTreeMap<String, f64>, axis: &str, params: &Params) {
     }
 }
 
-/// The number of at most twelve digits that is a few roundings from `x`, else `x`:
+/// The number of at most twelve digits that is some roundings from `x`, else `x`:
 /// what computing added goes (`9999.999999999998`), what somebody wrote stays.
 pub fn tidy(x: f64) -> f64 {
     let short: f64 = format!("{x:.11e}").parse().unwrap_or(x);
-    if (short - x).abs() <= 8.0 * f64::EPSILON * x.abs() { short } else { x }
+    if (short - x).abs() <= 32.0 * f64::EPSILON * x.abs() { short } else { x }
 }
 
 /// `x` to so many digits in as few characters as can be: `0.01`, `1e4`, `2.5e-7`.
@@ -100,6 +100,7 @@ mod tests {
             assert_eq!(short(x, 6), expected);
         }
         assert_eq!(tidy(9_999.999_999_999_998), 1e4);
+        assert_eq!(tidy(700_000.000_000_001_5), 7e5, "an end of a logarithmic range");
         assert_eq!(
             [0.1, 31.622_776_601_683_79, 0.123_456_789_012_345_6].map(tidy),
             [0.1, 31.622_776_601_683_79, 0.123_456_789_012_345_6]

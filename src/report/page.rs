@@ -71,6 +71,10 @@ pub fn document(content: &Content) -> String {
     if !problems.is_empty() {
         out += &section("gaps", "What is missing, and why", &problems);
     }
+    // Where a study asks for them they are what it is about.
+    if !content.sweeps.is_empty() {
+        out += &section("sweeps-section", "Errors against stressors", &sweeps_html(content));
+    }
     let time = ["total-time-modelled", "total-time", "time-per-frame", "triangles-per-frame"];
     out += &section("times-section", "Time and work", &(figures(content, &time) + &table(content, "times")));
     let front = ["time-against-error-modelled", "time-against-error", "time-against-over-submission"];
@@ -80,9 +84,6 @@ pub fn document(content: &Content) -> String {
         out += &section("frontier-section", "Run time against error", &body);
     }
     out += &section("errors-section", "Errors", &table(content, "errors"));
-    if !content.sweeps.is_empty() {
-        out += &section("sweeps-section", "Errors against stressors", &sweeps_html(content));
-    }
     let body = figures(content, &["memory"]) + &table(content, "memory");
     out += &section("memory-section", "Memory", &body);
     let body = figures(content, &["build-time"]) + &table(content, "build") + &table(content, "scenes");
@@ -135,14 +136,14 @@ fn header(content: &Content) -> String {
     if !content.judged.is_empty() {
         links.push(("claims-section", "Claims"));
     }
+    if !content.sweeps.is_empty() {
+        links.push(("sweeps-section", "Stressors"));
+    }
     links.extend([
         ("times-section", "Time and work"),
         ("frontier-section", "Time against error"),
         ("errors-section", "Errors"),
     ]);
-    if !content.sweeps.is_empty() {
-        links.push(("sweeps-section", "Stressors"));
-    }
     links.extend([("memory-section", "Memory"), ("build-section", "Structures")]);
     if content.again.is_some() {
         links.push(("repeatability-section", "Measured again"));
