@@ -156,7 +156,8 @@ fn over_submission_is_bracketed_where_hiding_was() {
     for run in &mut results.runs {
         run.spec.accuracy.hiding_cells = 0;
     }
-    assert!(results.runs.iter().all(|r| over_submission(r).unwrap().0.is_none()), "nothing was proved hidden");
+    let bounds: Vec<_> = results.runs.iter().filter_map(over_submission).collect();
+    assert!(bounds.len() > 10 && bounds.iter().all(|b| b.0.is_none()), "nothing was proved hidden");
 }
 
 #[test]
