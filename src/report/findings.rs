@@ -103,7 +103,12 @@ fn shortest(grid: &Grid) -> Vec<String> {
             places.join("; ")
         )
     };
-    winners.into_iter().map(sentence).collect()
+    // Where every scene has a winner of its own, the table below says it better.
+    winners.sort_by_key(|(_, places)| std::cmp::Reverse(places.len()));
+    let left: usize = winners.iter().skip(3).map(|(_, places)| places.len()).sum();
+    let more = (left > 0)
+        .then(|| format!("{} more methods are best on {left} more scenes: see the table.", winners.len() - 3));
+    winners.into_iter().take(3).map(sentence).chain(more).collect()
 }
 
 /// Where an aggressive method models a shorter frame still, and at what price.
