@@ -1,6 +1,7 @@
 //! The command line: one file a verb.
 
 pub mod check;
+pub mod claims;
 pub mod compact;
 pub mod compare;
 pub mod exec;
@@ -46,6 +47,8 @@ pub enum Verb {
     Compare(compare::Args),
     /// Who is on the front of run time against error, scene by scene
     Frontier(frontier::Args),
+    /// How the claims of a study fared: exit status 1 if one does not hold
+    Claims(claims::Args),
     /// A study measured more than once, compared with itself
     Repeatability(repeatability::Args),
     /// One frame of one method: counters, errors, image, submitted ids
@@ -78,6 +81,7 @@ pub fn main() -> ExitCode {
         Verb::Query(a) => query::run(a),
         Verb::Compare(a) => compare::run(a),
         Verb::Frontier(a) => frontier::run(a),
+        Verb::Claims(a) => claims::run(a),
         Verb::Repeatability(a) => repeatability::run(a),
         Verb::Inspect(a) => inspect::run(a),
         Verb::Scene(v) => scene::run(v),

@@ -61,7 +61,11 @@ pub fn named(study: &str) -> Result<(String, Option<Manifest>)> {
     Ok((manifest.study.name.clone(), Some(manifest)))
 }
 
-fn stored_claims(db: &Path, study: &str) -> Result<Vec<Claim>> {
+/// The claims that were stored with the study.
+///
+/// # Errors
+/// When the database fails or holds claims that this version cannot read.
+pub fn stored_claims(db: &Path, study: &str) -> Result<Vec<Claim>> {
     let text = store::block_on(async {
         let store = store::Store::open_existing(db).await?;
         let text = store.claims_json(study).await;

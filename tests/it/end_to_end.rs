@@ -82,6 +82,12 @@ fn a_study_goes_from_its_manifest_to_a_report_and_into_another_database() {
         assert!(bytes > 100, "{file} has {bytes} bytes");
     }
     assert!(std::fs::read_to_string(dir.join("report/tables/claims.md")).unwrap().contains("reproduced"));
+    let told = well(dir, "claims tiny --db x.db");
+    assert!(told.contains("frustum_pays: The frustum submits fewer") && told.contains("reproduced"), "{told}");
+    std::fs::write(dir.join("false.toml"), STUDY.replace("relation = \"<\"", "relation = \">\"")).unwrap();
+    let told = cullmark(dir, "claims false.toml --db x.db --format csv");
+    let text = String::from_utf8(told.stdout).unwrap();
+    assert!(told.status.code() == Some(1) && text.contains("contradicted"), "{}: {text}", told.status);
 
     let (end, trials) = run(dir, "--no-report");
     assert_eq!((&end["done"], trials), (&4.into(), 0), "the second time does nothing");
