@@ -5,6 +5,7 @@
 //! submitted ranges. No clock is read inside an algorithm: the clock brackets
 //! one frame's `begin` + walk, and nothing else.
 
+use crate::culling::distinct::Distinct;
 use crate::culling::{self, Class, DrawList, Removes, Tally, Test, Walk};
 use crate::error::{Error, Result};
 use crate::hierarchy::Hierarchy;
@@ -123,23 +124,13 @@ impl Setup {
     pub fn count_pass(&mut self, mut each: impl FnMut(&Setup, usize, &DrawList)) -> Vec<FrameWork> {
         self.reset();
         let mut list = DrawList::default();
-        // Stamps tell distinct triangles apart only where entries can repeat.
-        let unique = self.hierarchy.entries.len() == self.scene.len();
-        let mut stamp = vec![u32::MAX; if unique { 0 } else { self.scene.len() }];
+        let mut distinct = Distinct::new(&self.hierarchy.entries, self.scene.len());
         (0..self.views.len())
             .map(|frame| {
                 let mut tally = Tally::default();
                 self.cull(frame, &mut list, &mut tally);
                 let entries = list.entry_count();
-                let mut triangles = entries;
-                if !unique {
-                    triangles = 0;
-                    for position in list.positions() {
-                        let t = self.hierarchy.entries[position as usize] as usize;
-                        triangles += u64::from(stamp[t] != frame as u32);
-                        stamp[t] = frame as u32;
-                    }
-                }
+                let triangles = distinct.count(&list);
                 each(self, frame, &list);
                 FrameWork {
                     tally,

@@ -5,6 +5,7 @@
 pub mod back_face;
 pub mod depth_first;
 mod descent;
+pub mod distinct;
 pub mod facing_columns;
 pub mod facing_fixed;
 pub mod facing_kernels;
