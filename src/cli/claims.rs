@@ -1,11 +1,11 @@
 //! `cullmark claims`: how the statements of a study fared, for terminals and for scripts.
 
-use super::report::{named, put, stored_claims};
+use super::report::{put, with_claims};
 use crate::error::Error;
 use crate::report::claims::{Judged, Verdict, judge_all};
 use crate::report::query::{Format, print};
 use crate::report::tables;
-use crate::store::{self, Detail};
+use crate::store;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -24,12 +24,7 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let (study, manifest) = named(&args.study)?;
-    let results = store::read_results(&args.db, &study, Detail::Frames)?;
-    let claims = match manifest {
-        Some(manifest) => manifest.claims(),
-        None => stored_claims(&args.db, &study)?,
-    };
+    let (study, results, claims) = with_claims(&args.study, &args.db)?;
     if claims.is_empty() {
         return Err(Error::new(format!("study `{study}` makes no claims"))
             .help("write `[[claim]]` into its manifest and name that (docs/MANIFEST.md)")

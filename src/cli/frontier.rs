@@ -57,6 +57,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if args.format == Format::Table {
         put(&text(&grid, &found, (x, y), args.all))?;
+        if x.name == X && !found.is_empty() {
+            put(
+                "\nThe time is that of culling alone, so what culls little is fast; --x frame_ms_model adds drawing.\n",
+            )?;
+        }
     } else {
         put(&print(&table(&grid, &found, (x, y), args.all), args.format)?)?;
     }

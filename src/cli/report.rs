@@ -4,6 +4,7 @@ use crate::claim::Claim;
 use crate::error::{Error, Result};
 use crate::manifest::Manifest;
 use crate::report;
+use crate::results::StudyResults;
 use crate::store::{self, Detail};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -21,13 +22,7 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let (study, manifest) = named(&args.study)?;
-    let results = store::read_results(&args.db, &study, Detail::Frames)?;
-    let claims = match manifest {
-        // Claims may be written or mended after the run: those of the file win.
-        Some(manifest) => manifest.claims(),
-        None => stored_claims(&args.db, &study)?,
-    };
+    let (study, results, claims) = with_claims(&args.study, &args.db)?;
     let beside = args.db.parent().unwrap_or(Path::new("")).join(&study);
     let out = args.out.unwrap_or(beside);
     let series = store::read_series(&args.db, &study, Detail::Frames)?;
@@ -39,6 +34,21 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         files.tables.len() / 3
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// A study's name, its results and its claims.
+///
+/// # Errors
+/// When the manifest has mistakes, or the database fails or lacks the study.
+pub fn with_claims(study: &str, db: &Path) -> Result<(String, StudyResults, Vec<Claim>)> {
+    let (study, manifest) = named(study)?;
+    let results = store::read_results(db, &study, Detail::Frames)?;
+    let claims = match manifest {
+        // Claims may be written or mended after the run: those of the file win.
+        Some(manifest) => manifest.claims(),
+        None => stored_claims(db, &study)?,
+    };
+    Ok((study, results, claims))
 }
 
 /// A study by its name, or the one a manifest describes.
@@ -61,11 +71,7 @@ pub fn named(study: &str) -> Result<(String, Option<Manifest>)> {
     Ok((manifest.study.name.clone(), Some(manifest)))
 }
 
-/// The claims that were stored with the study.
-///
-/// # Errors
-/// When the database fails or holds claims that this version cannot read.
-pub fn stored_claims(db: &Path, study: &str) -> Result<Vec<Claim>> {
+fn stored_claims(db: &Path, study: &str) -> Result<Vec<Claim>> {
     let text = store::block_on(async {
         let store = store::Store::open_existing(db).await?;
         let text = store.claims_json(study).await;
