@@ -105,9 +105,12 @@ fn shortest(grid: &Grid) -> Vec<String> {
     };
     // Where every scene has a winner of its own, the table below says it better.
     winners.sort_by_key(|(_, places)| std::cmp::Reverse(places.len()));
-    let left: usize = winners.iter().skip(3).map(|(_, places)| places.len()).sum();
-    let more = (left > 0)
-        .then(|| format!("{} more methods are best on {left} more scenes: see the table.", winners.len() - 3));
+    let rest = winners.get(3..).unwrap_or_default();
+    let scenes = rest.iter().map(|(_, places)| places.len() as u64).sum();
+    let more = (!rest.is_empty()).then(|| {
+        let methods = count(rest.len() as u64, "more method", "more methods");
+        format!("On {}, {methods}: see the table.", count(scenes, "other scene", "other scenes"))
+    });
     winners.into_iter().take(3).map(sentence).chain(more).collect()
 }
 
