@@ -5,6 +5,20 @@ use std::path::{Path, PathBuf};
 
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
+/// Whose fault it is: what a service answers depends on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ErrorKind {
+    /// The input's.
+    #[default]
+    Input,
+    /// It names what is not there.
+    Missing,
+    /// It does not fit the state that things are in now.
+    Conflict,
+    /// The disk's, the database's, the system's: the same input may do later.
+    Unavailable,
+}
+
 /// An error a user can act on. A panic, by contrast, is always our own bug.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Error {
@@ -21,6 +35,7 @@ pub struct Error {
     pub help: Option<String>,
     /// Source excerpt with carets, ready to print, where a reader has one.
     pub snippet: Option<String>,
+    pub kind: ErrorKind,
 }
 
 impl Error {
@@ -45,6 +60,11 @@ impl Error {
 
     pub fn key(mut self, key: impl Into<String>) -> Self {
         self.key.get_or_insert(key.into());
+        self
+    }
+
+    pub fn kind(mut self, kind: ErrorKind) -> Self {
+        self.kind = kind;
         self
     }
 

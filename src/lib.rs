@@ -3,7 +3,7 @@
 //! # Code map
 //! Two halves meet at plain types in [`record`]:
 //! - the **lab** (`math`, `scene`, `hierarchy`, `structure`, `culling`, `oracle`,
-//!   `runner`, `stats`) is synchronous: no tokio, no SQL, no HTTP, no clock
+//!   `runner`, `stats`, `viewing`) is synchronous: no tokio, no SQL, no HTTP, no clock
 //!   inside an algorithm;
 //! - the **service** (`manifest`, `matrix`, `store`, `worker`, `report`, `cli`)
 //!   knows nothing of triangles; what it needs of them it asks of the lab in a
@@ -28,11 +28,16 @@ pub mod runner;
 pub mod scene;
 pub mod stats;
 pub mod structure;
+pub mod viewing;
 
+#[cfg(feature = "service")]
+pub mod api;
 #[cfg(feature = "manifest")]
 pub mod claim;
 #[cfg(feature = "service")]
 pub mod cli;
+#[cfg(feature = "service")]
+pub mod intake;
 #[cfg(feature = "manifest")]
 pub mod manifest;
 #[cfg(feature = "manifest")]

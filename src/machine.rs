@@ -2,6 +2,8 @@
 //! and whether it was quiet. Everything here is Linux first; elsewhere the
 //! answers are "unknown" and pinning does nothing.
 
+pub mod fitness;
+
 use crate::error::{Error, Result};
 use crate::record::Environment;
 use std::hint::black_box;

@@ -66,8 +66,7 @@ pub fn render(scene: &Scene, view: &View, width: u32, height: u32, style: &Style
     };
     let buffers = rasterise(scene, view, w, h, style, &looks);
     let sun = style.shadows.then(|| Sun::new(scene, style, &looks));
-    let palette: Vec<DVec3> =
-        (0..scene.material_names.len().max(1) as u32).map(|m| material_colour(scene, m)).collect();
+    let palette = palette(scene);
     let bounds = scene.bounds();
     let shade = |x: usize, y: usize| -> DVec3 {
         let i = y * w + x;
@@ -133,6 +132,16 @@ pub fn render(scene: &Scene, view: &View, width: u32, height: u32, style: &Style
         }
     });
     Image { width, height, rgba }
+}
+
+/// Colour of every material, 8 bits a channel; of a scene that names none, of the one it has.
+pub fn material_colours(scene: &Scene) -> Vec<[u8; 3]> {
+    let byte = |x: f64| (x.clamp(0.0, 1.0) * 255.0).round() as u8;
+    palette(scene).iter().map(|c| c.to_array().map(byte)).collect()
+}
+
+fn palette(scene: &Scene) -> Vec<DVec3> {
+    (0..scene.material_names.len().max(1) as u32).map(|m| material_colour(scene, m)).collect()
 }
 
 fn rgb(c: [u8; 3]) -> DVec3 {

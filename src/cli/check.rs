@@ -52,7 +52,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// Manifest and matrix, or every mistake in them.
 pub fn read(path: &Path, sets: &[String]) -> Result<(Manifest, Matrix), Vec<Error>> {
     let manifest = Manifest::load(path, sets)?;
-    let matrix = expand(&manifest, &super::run::setting(0))?;
+    let matrix = expand(&manifest, &crate::intake::setting(0))?;
     Ok((manifest, matrix))
 }
 

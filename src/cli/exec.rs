@@ -4,11 +4,12 @@
 //! nameable error leaves with exit code 1; anything else is a crash, and the
 //! worker says so.
 
+use super::pipe;
 use crate::error::{Error, Result};
 use crate::record::RunSpec;
 use crate::{machine, runner};
 use serde::{Deserialize, Serialize};
-use std::io::{Read, Write};
+use std::io::Read;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -36,21 +37,7 @@ pub fn run(_args: Args) -> anyhow::Result<ExitCode> {
     let mut text = String::new();
     std::io::stdin().read_to_string(&mut text)?;
     let job: Job = serde_json::from_str(&text)?;
-    let answer = execute(&job);
-    let mut out = std::io::stdout().lock();
-    let code = match answer {
-        Ok(value) => {
-            writeln!(out, "{}", serde_json::json!({ "ok": value }))?;
-            ExitCode::SUCCESS
-        }
-        Err(e) => {
-            let (help, message) = (e.help.clone(), Error { help: None, ..e }.to_string());
-            writeln!(out, "{}", serde_json::json!({ "error": { "message": message, "help": help } }))?;
-            ExitCode::from(1)
-        }
-    };
-    out.flush()?;
-    Ok(code)
+    pipe::answer(execute(&job))
 }
 
 fn execute(job: &Job) -> Result<serde_json::Value> {

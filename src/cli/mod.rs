@@ -1,24 +1,37 @@
 //! The command line: one file a verb.
 
+pub mod backup;
+pub mod cancel;
 pub mod check;
 pub mod claims;
+pub mod client;
 pub mod compact;
 pub mod compare;
+pub mod doctor;
+pub mod examine;
 pub mod exec;
 pub mod export;
 pub mod frontier;
 pub mod import;
 pub mod inspect;
-mod known;
 pub mod path;
+mod pipe;
 pub mod plan;
 pub mod preflight;
 pub mod progress;
 pub mod query;
+mod remote_table;
 pub mod repeatability;
 pub mod report;
 pub mod run;
 pub mod scene;
+pub mod serve;
+mod signals;
+pub mod submit;
+pub mod token;
+pub mod view;
+pub mod watch;
+pub mod worker;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -51,6 +64,23 @@ pub enum Verb {
     Claims(claims::Args),
     /// A study measured more than once, compared with itself
     Repeatability(repeatability::Args),
+    /// Serve studies, results and the page over HTTP, and work for them
+    Serve(serve::Args),
+    /// Work for every study of a database, without serving it
+    Worker(worker::Args),
+    /// Send a study to a server
+    Submit(submit::Args),
+    /// Watch a study on a server until it is finished
+    Watch(watch::Args),
+    /// Drop what is left to do of a study; --pause, --resume
+    Cancel(cancel::Args),
+    /// Who may ask a server what
+    #[command(subcommand)]
+    Token(token::Verb),
+    /// Is this machine fit to measure?
+    Doctor(doctor::Args),
+    /// Copy the database while others work with it
+    Backup(backup::Args),
     /// One frame of one method: counters, errors, image, submitted ids
     Inspect(inspect::Args),
     /// Scenes: info, generate, convert
@@ -68,6 +98,15 @@ pub enum Verb {
     /// Run one trial from a specification on standard input (used by workers)
     #[command(hide = true)]
     Exec(exec::Args),
+    /// Show a run or a scene: requests in, binary forms out (used by the server)
+    #[command(hide = true)]
+    View(view::Args),
+    /// Check an uploaded scene or camera path (used by the server)
+    #[command(hide = true)]
+    Examine(examine::Args),
+    /// Read the scenes and paths of runs before they are queued (used by the server)
+    #[command(hide = true)]
+    Preflight(preflight::Args),
 }
 
 /// Exit code 0: all well; 1: ran, but something failed or is wrong; 2: bad input.
@@ -83,6 +122,14 @@ pub fn main() -> ExitCode {
         Verb::Frontier(a) => frontier::run(a),
         Verb::Claims(a) => claims::run(a),
         Verb::Repeatability(a) => repeatability::run(a),
+        Verb::Serve(a) => serve::run(a),
+        Verb::Worker(a) => worker::run(a),
+        Verb::Submit(a) => submit::run(a),
+        Verb::Watch(a) => watch::run(a),
+        Verb::Cancel(a) => cancel::run(a),
+        Verb::Token(v) => token::run(v),
+        Verb::Doctor(a) => doctor::run(a),
+        Verb::Backup(a) => backup::run(a),
         Verb::Inspect(a) => inspect::run(a),
         Verb::Scene(v) => scene::run(v),
         Verb::Path(v) => path::run(v),
@@ -90,6 +137,9 @@ pub fn main() -> ExitCode {
         Verb::Import(a) => import::run(a),
         Verb::Compact(a) => compact::run(a),
         Verb::Exec(a) => exec::run(a),
+        Verb::View(a) => view::run(a),
+        Verb::Examine(a) => examine::run(a),
+        Verb::Preflight(a) => preflight::run(a),
     };
     match result {
         Ok(code) => code,

@@ -1,10 +1,10 @@
 //! `cullmark plan`.
 
-use super::run::{series, setting};
-use super::{check, known};
+use super::check;
 use crate::error::Error;
+use crate::intake::{self, series, setting};
 use crate::manifest::Manifest;
-use crate::matrix::plan::{Known, Plan, plan};
+use crate::matrix::plan::Plan;
 use crate::matrix::{self, Matrix};
 use crate::store::{self, Store};
 use std::path::PathBuf;
@@ -66,18 +66,9 @@ async fn planned(args: &Args, manifest: &Manifest) -> anyhow::Result<Result<Plan
         Ok(matrix) => matrix,
         Err(errors) => return Ok(Err(errors)),
     };
-    let known = match &store {
-        Some(store) => {
-            let study = format!("{}@{series}", manifest.study.name);
-            known::known(store, &study, &matrix, &manifest.repeat).await?
-        }
-        None => vec![Known::default(); matrix.runs.len()],
-    };
+    let plan = intake::planned(manifest, &matrix, store.as_ref(), series).await?;
     if let Some(store) = store {
         store.close().await;
     }
-    // `plan` asks for the runs in their order.
-    let next = std::cell::Cell::new(0);
-    let answer = |_: &crate::record::RunSpec| known[next.replace(next.get() + 1)].clone();
-    Ok(Ok(plan(manifest, &matrix, answer)))
+    Ok(Ok(plan))
 }

@@ -84,6 +84,7 @@ impl Progress {
     fn draw(&self, event: &Event) {
         let mut state = self.state();
         match event {
+            Event::Trouble { message, again_s, .. } => self.say(&format!("{message}; trying again in {again_s} s")),
             Event::LaneBusy => self.bar.set_message("waiting: another study measures on this machine"),
             Event::JobStarted { kind: Kind::Trial, run, repeat, take, .. } => {
                 let again = if *take > 0 { " again: it was disturbed" } else { "" };
@@ -116,7 +117,7 @@ impl Progress {
                     self.say(&format!("{run}: will be tried again: {reason}"));
                 }
             }
-            Event::RunEnded { measurement_id, run, status, reason } => {
+            Event::RunEnded { study_id: _, measurement_id, run, status, reason } => {
                 if !state.ended.insert(measurement_id.clone()) {
                     return;
                 }

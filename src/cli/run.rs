@@ -1,15 +1,17 @@
 //! `cullmark run`: manifest, matrix, queue, workers, results, report.
 
 use super::progress::{Mode, Progress, duration, json_line};
+use super::signals::{self, INTERRUPTED};
 use super::{check, preflight};
 use crate::error::Error;
+use crate::intake::{Wish, series, setting, submission};
 use crate::machine;
 use crate::manifest::Manifest;
 use crate::matrix::{self, Matrix, Setting};
 use crate::results::{RunStatus, StudyResults};
-use crate::store::{Cell, Detail, Store, Submission, Submitted};
+use crate::store::{Detail, Store, Submitted};
 use crate::worker::child::Launcher;
-use crate::worker::{self, lane};
+use crate::worker::{self, Phase, lane};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -53,9 +55,6 @@ pub struct Args {
     json: bool,
 }
 
-/// Interrupted by Ctrl-C, as shells count it.
-const INTERRUPTED: u8 = 130;
-
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let manifest = match Manifest::load(&args.manifest, &args.set) {
         Ok(manifest) => manifest,
@@ -67,17 +66,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     launcher.leave_the_lane();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     runtime.block_on(study(&args, &manifest, launcher, machine_class))
-}
-
-/// The part of every run that the machine decides. `plan` needs the same for the same ids.
-pub fn setting(series: u32) -> Setting {
-    Setting {
-        pin_core: machine::measuring_core(),
-        build_profile: machine::build_profile().to_string(),
-        isa: machine::isa().to_string(),
-        threads: 1,
-        series,
-    }
 }
 
 fn mistakes(errors: &[Error], json: bool) -> ExitCode {
@@ -107,7 +95,8 @@ async fn study(
         Ok(notes) => notes,
         Err(errors) => return Ok(mistakes(&errors, args.json)),
     };
-    let submitted = store.submit(&submission(args, manifest, &matrix, machine_class, series)).await?;
+    let wish = Wish { series, retry_failed: args.retry_failed, folder: origin(&args.manifest), ..Wish::default() };
+    let submitted = store.submit(&submission(manifest, &matrix, machine_class, wish)).await?;
     let mode = match (args.json, args.quiet) {
         (true, _) => Mode::Json,
         (_, true) => Mode::Quiet,
@@ -128,7 +117,7 @@ async fn study(
         Arc::new(move |event| progress.on(&event))
     };
     let stop = stop_on_signal();
-    let stopped = worker::work(&store, submitted.study_id, &manifest.repeat, &options, tell, stop).await;
+    let stopped = worker::work(&store, submitted.study_id, &options, tell, stop).await;
     let told = progress.end();
     let stopped = stopped?;
 
@@ -157,37 +146,10 @@ struct End {
     elapsed: Duration,
 }
 
-/// The number that `--series` asks for.
-pub(super) async fn series(asked: Option<&str>, store: &Store, study: &str) -> anyhow::Result<u32> {
-    Ok(match asked {
-        None => 0,
-        Some("next") => store.next_series(study).await?,
-        Some(text) => text.parse().map_err(|_| {
-            Error::new(format!("`--series {text}` is neither `next` nor a number"))
-                .help("`--series next` measures the whole study again beside what is stored")
-        })?,
-    })
-}
-
-fn submission(args: &Args, manifest: &Manifest, matrix: &Matrix, machine_class: String, series: u32) -> Submission {
-    let cell = |spec: &crate::record::RunSpec| {
-        let labels = matrix::labels(spec);
-        Cell { spec: spec.clone(), structure: labels.structure, culling: labels.culling, walk: labels.walk }
-    };
-    Submission {
-        name: manifest.study.name.clone(),
-        title: manifest.study.title.clone(),
-        manifest_toml: manifest.source_text.clone(),
-        claims_json: serde_json::to_string(&manifest.claims()).expect("claims are plain data"),
-        sweeps_json: serde_json::to_string(&manifest.sweeps()).expect("sweeps are plain data"),
-        consolidate_frames: manifest.timing.consolidate_frames,
-        policy: manifest.repeat.clone(),
-        machine_class,
-        series,
-        cells: matrix.runs.iter().map(cell).collect(),
-        excluded: matrix.excluded.clone(),
-        retry_failed: args.retry_failed,
-    }
+/// Where the files that a manifest names start from, wherever a later program stands.
+fn origin(manifest: &Path) -> String {
+    let folder = manifest.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    folder.canonicalize().map(|f| f.display().to_string()).unwrap_or_default()
 }
 
 fn announce(mode: Mode, manifest: &Manifest, matrix: &Matrix, s: &Submitted, series: u32) {
@@ -220,32 +182,20 @@ fn announce(mode: Mode, manifest: &Manifest, matrix: &Matrix, s: &Submitted, ser
     }
 }
 
-/// True after the first Ctrl-C or termination request; a second one ends the
+/// Told to stop by the first Ctrl-C or termination request; a second one ends the
 /// process at once (children die with it, leases are returned at the next start).
-fn stop_on_signal() -> watch::Receiver<bool> {
-    let (sender, receiver) = watch::channel(false);
+fn stop_on_signal() -> watch::Receiver<Phase> {
+    let (sender, receiver) = watch::channel(Phase::Work);
+    let mut signals = signals::listen();
     tokio::spawn(async move {
         let mut asked = 0;
-        loop {
-            #[cfg(unix)]
-            {
-                use tokio::signal::unix::{SignalKind, signal};
-                let Ok(mut terminate) = signal(SignalKind::terminate()) else { return };
-                tokio::select! {
-                    _ = tokio::signal::ctrl_c() => {}
-                    _ = terminate.recv() => {}
-                }
-            }
-            #[cfg(not(unix))]
-            if tokio::signal::ctrl_c().await.is_err() {
-                return;
-            }
+        while signals.recv().await.is_some() {
             asked += 1;
             if asked > 1 {
                 std::process::exit(i32::from(INTERRUPTED));
             }
             eprintln!("stopping: what is finished is kept (again to stop at once)");
-            let _ = sender.send(true);
+            let _ = sender.send(Phase::Stop);
         }
     });
     receiver

@@ -27,6 +27,10 @@ impl Walk for DepthFirst {
         None
     }
 
+    fn remembers(&self) -> bool {
+        false
+    }
+
     fn run(
         &mut self,
         _view: &View,

@@ -25,6 +25,10 @@ impl Walk for Flat {
         None
     }
 
+    fn remembers(&self) -> bool {
+        false
+    }
+
     fn run(
         &mut self,
         _view: &View,

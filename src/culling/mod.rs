@@ -110,6 +110,7 @@ pub trait Test: Send {
     /// Judges the `live` lanes of `block` and counts its own work (`lane_tests` and
     /// what it compares) in `tally`. `carry` is what the parent got
     /// (never 0: the walk does not ask then).
+    /// What was learnt in earlier frames may save work; it never changes a verdict.
     fn judge(&mut self, hierarchy: &Hierarchy, block: u32, live: u8, carry: u8, tally: &mut Tally) -> Verdict;
     /// Judges the root blocks one after another without a hierarchy below them:
     /// ORs the outside lanes of block `b` into `outside[b]`; lanes that are not
@@ -172,6 +173,11 @@ pub trait Walk: Send {
     fn refuses(&self, hierarchy: &Hierarchy) -> Option<String>;
     /// Forgets earlier frames, as [`Test::reset`].
     fn reset(&mut self) {}
+    /// Whether earlier frames of the pass may change what is submitted. If not, any
+    /// frame can be culled by itself.
+    fn remembers(&self) -> bool {
+        true
+    }
     /// Appends what to draw for this frame. `tests` have begun the frame.
     fn run(
         &mut self,

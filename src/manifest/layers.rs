@@ -52,7 +52,21 @@ fn layer(mistakes: &mut Mistakes, source: usize, stack: &mut Vec<PathBuf>) -> Op
             );
             continue;
         };
-        let path = mistakes.sources.folder(&preset.place).join(file);
+        if let Some(text) = mistakes.sources.reach.preset(file) {
+            let source = mistakes.sources.add(file, text, true);
+            // Those of ours extend nothing, so there is no circle to watch for.
+            if let Some(table) = layer(mistakes, source, stack) {
+                merge(&mut base, table);
+            }
+            continue;
+        }
+        let path = match mistakes.sources.resolve(&preset.place, file) {
+            Ok(path) => path,
+            Err(e) => {
+                mistakes.note(&preset.place, "extends", e);
+                continue;
+            }
+        };
         let id = identity(&path);
         if stack.contains(&id) {
             let e = Error::new(format!("{} extends itself", path.display()));

@@ -12,6 +12,7 @@ mod fields;
 mod lab;
 mod layers;
 mod ranges;
+pub mod reach;
 mod rules;
 mod scenes;
 mod sections;
@@ -27,6 +28,7 @@ use crate::record::{Accuracy, PathSpec, RepeatPolicy, SceneSpec, TimeModel};
 use crate::sweep::Sweep;
 use axes::AxisValues;
 use fields::Fields;
+use reach::Reach;
 pub use rules::{Exclude, Include, Rule, Zip};
 use source::{Mistakes, Place, Sources};
 use std::path::Path;
@@ -94,18 +96,26 @@ impl Manifest {
     /// # Errors
     /// Those of [`Manifest::load`].
     pub fn parse(text: String, path: &Path, sets: &[String]) -> Result<Manifest, Vec<Error>> {
-        let mut mistakes = Mistakes::new(Sources::default());
+        Manifest::parse_within(text, path, sets, Reach::Anywhere)
+    }
+
+    /// [`Manifest::parse`] of a text that may name some files only.
+    ///
+    /// # Errors
+    /// Those of [`Manifest::load`], and for files out of reach.
+    pub fn parse_within(text: String, path: &Path, sets: &[String], reach: Reach) -> Result<Manifest, Vec<Error>> {
+        let mut mistakes = Mistakes::new(Sources { reach, ..Sources::default() });
         let table = layers::read(&mut mistakes, text, path, sets);
         let Some(table) = table else { return Err(mistakes.into_errors().1) };
         let manifest = decode(&mistakes, &table, path);
-        let plain = mistakes.sources.0.len() == 1;
+        let plain = mistakes.sources.texts.len() == 1;
         let (sources, errors) = mistakes.into_errors();
         match manifest {
             Some(mut manifest) if errors.is_empty() => {
                 manifest.source_text = if plain {
-                    sources.0[0].text.clone()
+                    sources.texts[0].text.clone()
                 } else {
-                    let layers: Vec<String> = sources.0.iter().map(|s| s.name.display().to_string()).collect();
+                    let layers: Vec<String> = sources.texts.iter().map(|s| s.name.display().to_string()).collect();
                     format!("# Merged from {}.\n\n{}", layers.join(", ").replace('\n', " "), tree::to_toml(&table))
                 };
                 manifest.sources = sources;

@@ -260,7 +260,13 @@ fn source(
         }
         (Some(node), None) => {
             let text = f.text("file")?;
-            let path = f.mistakes.sources.folder(&node.place).join(text);
+            let path = match f.mistakes.sources.resolve(&node.place, text) {
+                Ok(path) => path,
+                Err(e) => {
+                    f.note(&node.place, "file", e);
+                    return None;
+                }
+            };
             let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
             if !extensions.contains(&extension.as_str()) {
                 let e = Error::new(format!("`{text}` is of no known type"));

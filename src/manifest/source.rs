@@ -1,7 +1,8 @@
 //! Texts that a manifest is made of (files and `--set` arguments), places in
 //! them, and errors that show the place.
 
-use crate::error::Error;
+use super::reach::Reach;
+use crate::error::{Error, Result};
 use std::cell::RefCell;
 use std::fmt::Write;
 use std::ops::Range;
@@ -18,7 +19,11 @@ pub struct Source {
 
 /// Every text read so far; a [`Place`] points into it.
 #[derive(Debug, Clone, Default)]
-pub struct Sources(pub Vec<Source>);
+pub struct Sources {
+    pub texts: Vec<Source>,
+    /// Which files they may name.
+    pub reach: Reach,
+}
 
 /// Bytes `span` of text `source`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,25 +37,33 @@ const EXCERPT: usize = 100;
 
 impl Sources {
     pub fn add(&mut self, name: impl Into<PathBuf>, text: impl Into<String>, is_file: bool) -> usize {
-        self.0.push(Source { name: name.into(), text: text.into(), is_file });
-        self.0.len() - 1
+        self.texts.push(Source { name: name.into(), text: text.into(), is_file });
+        self.texts.len() - 1
     }
 
     pub fn text(&self, place: &Place) -> &str {
-        self.0[place.source].text.get(place.span.clone()).unwrap_or("")
+        self.texts[place.source].text.get(place.span.clone()).unwrap_or("")
     }
 
     /// Folder that relative files at `place` start from: that of the manifest, or
     /// the current one for `--set`.
     pub fn folder(&self, place: &Place) -> PathBuf {
-        let source = &self.0[place.source];
+        let source = &self.texts[place.source];
         let parent = source.name.parent().filter(|_| source.is_file);
         parent.map(Path::to_path_buf).unwrap_or_default()
     }
 
+    /// The file that `text` at `place` names.
+    ///
+    /// # Errors
+    /// When it is out of reach.
+    pub fn resolve(&self, place: &Place, text: &str) -> Result<PathBuf> {
+        self.reach.resolve(&self.folder(place), text)
+    }
+
     /// `error` placed at `place`, with file, line, column and an excerpt.
     pub fn locate(&self, place: &Place, error: Error) -> Error {
-        let source = &self.0[place.source];
+        let source = &self.texts[place.source];
         let text = &source.text;
         let start = floor_boundary(text, place.span.start);
         let end = floor_boundary(text, place.span.end).max(start);

@@ -70,7 +70,7 @@ pub fn get<'a>(table: &'a Table, name: &str) -> Option<&'a Node> {
 
 /// Parses text number `source`; every syntax error is noted.
 pub fn parse(mistakes: &Mistakes, source: usize) -> Option<Table> {
-    let text = mistakes.sources.0[source].text.clone();
+    let text = mistakes.sources.texts[source].text.clone();
     let (table, errors) = DeTable::parse_recoverable(&text);
     let before = mistakes.count();
     for e in &errors {
@@ -93,7 +93,7 @@ fn note_once_a_line(mistakes: &Mistakes, place: &Place, error: Error, text: &str
 /// Parses `text`, the part of `--set` argument `source` from byte `offset` on, as a value.
 /// Words that are no TOML value are strings, so that shells need no double quoting.
 pub fn parse_value(mistakes: &Mistakes, source: usize, offset: usize) -> Result<Node, Error> {
-    let text = &mistakes.sources.0[source].text[offset..];
+    let text = &mistakes.sources.texts[source].text[offset..];
     match DeValue::parse(text) {
         Ok(value) => {
             let mut node = convert(mistakes, source, &value);

@@ -7,10 +7,11 @@ use crate::math::{Camera, Pose};
 use crate::record::Accuracy;
 use crate::scene::Scene;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 const MAGIC: &[u8; 16] = b"cullmark truth\0\0";
+const FOLDER: &str = "truth";
 
 /// [`truth`], read from `cache_dir/truth/<id>.bin` if it is there; `id` must
 /// determine all other arguments ([`crate::record::RunSpec::truth_id`]).
@@ -25,15 +26,11 @@ pub fn truth_cached(
     cache_dir: &Path,
     id: &str,
 ) -> Result<Truth> {
-    let folder = cache_dir.join("truth");
-    let path = folder.join(format!("{id}.bin"));
-    let fits = |t: &Truth| {
-        t.scene_triangles as usize == scene.len()
-            && t.frames.iter().map(|f| f.frame).eq(poses.iter().map(|(frame, _)| *frame))
-    };
-    if let Some(truth) = fs::read(&path).ok().and_then(|bytes| decode(&bytes)).filter(fits) {
+    let frames: Vec<u32> = poses.iter().map(|(frame, _)| *frame).collect();
+    if let Some(truth) = truth_stored(scene.len(), &frames, cache_dir, id) {
         return Ok(truth);
     }
+    let (folder, path) = (cache_dir.join(FOLDER), file(cache_dir, id));
     let truth = truth(scene, camera, poses, accuracy);
     fs::create_dir_all(&folder).map_err(|e| cannot_write(&folder, &e))?;
     // Other processes may compute the same truth: each writes its own file, and
@@ -48,6 +45,17 @@ pub fn truth_cached(
         return Err(cannot_write(&path, &e));
     }
     Ok(truth)
+}
+
+/// What [`truth_cached`] would read, if it is there and of this scene and these frames.
+pub fn truth_stored(triangles: usize, frames: &[u32], cache_dir: &Path, id: &str) -> Option<Truth> {
+    let truth = decode(&fs::read(file(cache_dir, id)).ok()?)?;
+    let fits = truth.scene_triangles as usize == triangles && truth.frames.iter().map(|f| &f.frame).eq(frames);
+    fits.then_some(truth)
+}
+
+fn file(cache_dir: &Path, id: &str) -> PathBuf {
+    cache_dir.join(FOLDER).join(format!("{id}.bin"))
 }
 
 fn cannot_write(path: &Path, e: &std::io::Error) -> Error {

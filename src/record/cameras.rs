@@ -156,7 +156,7 @@ pub fn label(spec: &Spec) -> String {
 }
 
 /// Degrees as somebody wrote them: converting back gives the same radians.
-fn degrees(rad: f64) -> f64 {
+pub fn degrees(rad: f64) -> f64 {
     let short = tidy(rad.to_degrees());
     if short.to_radians() == rad { short } else { rad.to_degrees() }
 }

@@ -54,6 +54,25 @@ impl Fields {
         fields
     }
 
+    /// Of runs whose parts are known otherwise.
+    pub fn from_parts(
+        further_axes: impl IntoIterator<Item = String>,
+        params: BTreeSet<(String, String)>,
+        numbers: BTreeSet<String>,
+    ) -> Fields {
+        let mut axes: Vec<String> = AXES.iter().map(|a| a.to_string()).collect();
+        for axis in further_axes {
+            if !axes.contains(&axis) {
+                axes.push(axis);
+            }
+        }
+        Fields { axes, params, numbers }
+    }
+
+    pub fn axes(&self) -> &[String] {
+        &self.axes
+    }
+
     pub fn find(&self, name: &str) -> Option<Field> {
         if self.axes.iter().any(|a| a == name) {
             return Some(Field::Axis(name.into()));
@@ -204,7 +223,7 @@ fn metric(name: &str) -> &'static Metric {
     metrics::known(name)
 }
 
-fn has_interval(m: &Metric) -> bool {
+pub(super) fn has_interval(m: &Metric) -> bool {
     use super::metrics::Kind::{Measured, Modelled};
     matches!(m.kind, Measured | Modelled) && !["noise", "mad_total_cull_ms"].contains(&m.name)
 }

@@ -33,39 +33,73 @@ pub fn arithmetic(run: &RunResult) -> String {
     if all.is_empty() { "takes none".into() } else { all.into_iter().collect::<Vec<_>>().join("+") }
 }
 
+/// What names are made of.
+#[derive(Debug, Clone)]
+pub struct Parts {
+    pub scene: String,
+    pub path: String,
+    pub structure: String,
+    pub culling: String,
+    pub walk: String,
+    /// The value of the axis, and whether the run states it.
+    pub arithmetic: String,
+    pub states_arithmetic: bool,
+    pub further: Vec<String>,
+    pub machine_class: String,
+    pub series: u32,
+}
+
+impl Parts {
+    pub fn of(run: &RunResult) -> Parts {
+        Parts {
+            scene: run.scene().to_string(),
+            path: run.spec.path.name.clone(),
+            structure: run.structure.clone(),
+            culling: run.culling.clone(),
+            walk: run.walk.clone(),
+            arithmetic: format_sum(&axis_value(&run.spec, NAME)),
+            states_arithmetic: run.spec.axes.contains_key(NAME),
+            further: run.spec.further(),
+            machine_class: run.machine_class.clone(),
+            series: run.spec.series,
+        }
+    }
+}
+
 /// Names of all runs, in their order. A walk is named only where runs of the
 /// same structure differ in it; an arithmetic where it is not the usual one or where
 /// runs of one method differ in it; a machine class or series only when they vary.
-fn names(results: &StudyResults) -> Vec<Names> {
+pub fn names(runs: &[Parts]) -> Vec<Names> {
     let mut walks: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     let mut paths: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     let mut usual_only: BTreeMap<(&str, &str), bool> = BTreeMap::new();
-    for run in &results.runs {
+    for run in runs {
         walks.entry(&run.structure).or_default().insert(&run.walk);
-        paths.entry(run.scene()).or_default().insert(&run.spec.path.name);
-        *usual_only.entry((&run.structure, &run.culling)).or_insert(true) &= !run.spec.axes.contains_key("arithmetic");
+        paths.entry(&run.scene).or_default().insert(&run.path);
+        *usual_only.entry((&run.structure, &run.culling)).or_insert(true) &= !run.states_arithmetic;
     }
-    let machines: BTreeSet<&str> = results.runs.iter().map(|r| r.machine_class.as_str()).collect();
-    let series: BTreeSet<String> = results.runs.iter().map(|r| r.spec.series.to_string()).collect();
-    let name = |run: &RunResult| {
+    let machines: BTreeSet<&str> = runs.iter().map(|r| r.machine_class.as_str()).collect();
+    let series: BTreeSet<u32> = runs.iter().map(|r| r.series).collect();
+    let name = |run: &Parts| {
         let mut rest = String::new();
         if walks[run.structure.as_str()].len() > 1 {
             rest += &format!(" × {}", run.walk);
         }
-        if !usual_only[&(run.structure.as_str(), run.culling.as_str())] && !run.spec.axes.contains_key("arithmetic") {
-            rest += &format!(" × {}", format_sum(&axis_value(&run.spec, "arithmetic")));
+        if !usual_only[&(run.structure.as_str(), run.culling.as_str())] && !run.states_arithmetic {
+            rest += &format!(" × {}", run.arithmetic);
         }
-        for part in run.spec.further() {
+        for part in &run.further {
             rest += &format!(" × {part}");
         }
         if machines.len() > 1 {
             rest += &format!(" on {}", run.machine_class);
         }
         if series.len() > 1 {
-            rest += &format!(" (series {})", run.spec.series);
+            rest += &format!(" (series {})", run.series);
         }
-        let scene = run.scene();
-        let place = if paths[scene].len() > 1 { format!("{scene} / {}", run.spec.path.name) } else { scene.into() };
+        let scene = &run.scene;
+        let several = paths[scene.as_str()].len() > 1;
+        let place = if several { format!("{scene} / {}", run.path) } else { scene.clone() };
         Names {
             place,
             variant: format!("{}{rest}", run.structure),
@@ -73,7 +107,7 @@ fn names(results: &StudyResults) -> Vec<Names> {
             combination: format!("{} × {}{rest}", run.structure, run.culling),
         }
     };
-    results.runs.iter().map(name).collect()
+    runs.iter().map(name).collect()
 }
 
 /// The scene; with its path when a scene is walked by several.
@@ -103,7 +137,7 @@ pub struct Grid<'a> {
 
 impl<'a> Grid<'a> {
     pub fn of(results: &'a StudyResults) -> Grid<'a> {
-        let names = names(results);
+        let names = names(&results.runs.iter().map(Parts::of).collect::<Vec<_>>());
         let legend = Legend::of(&names);
         let mut places: Vec<String> = Vec::new();
         for n in &names {

@@ -184,7 +184,7 @@ impl Metric {
         if values.len() < 2 || self.name.starts_with("mad_") || self.name == "noise" {
             return Some((value, value, value));
         }
-        let (low, high) = stats::bootstrap_ci_median(&values, stats::RESAMPLES, SEED);
+        let (low, high) = stats::median_ci(&values);
         Some((value, low, high))
     }
 

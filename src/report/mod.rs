@@ -9,10 +9,12 @@
 
 pub mod charts;
 pub mod claims;
+pub mod columns;
 pub mod compare;
 pub mod consolidate;
 pub mod curves;
 pub mod facets;
+pub mod facts;
 pub mod fields;
 pub mod figure;
 pub mod filter;
@@ -35,6 +37,7 @@ pub mod repeatability_tables;
 pub mod rows;
 pub mod scale;
 pub mod scatter;
+pub mod select;
 pub mod style;
 pub mod sweep_chart;
 pub mod sweep_tables;

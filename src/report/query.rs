@@ -61,7 +61,7 @@ pub fn query(results: &StudyResults, query: &Query) -> Result<Table> {
 }
 
 /// Numbers by size, text by letters; what is missing comes last either way.
-fn compare(a: &Cell, b: &Cell, descending: bool) -> Ordering {
+pub(super) fn compare(a: &Cell, b: &Cell, descending: bool) -> Ordering {
     let number = |c: &Cell| match c {
         Cell::Number(x) | Cell::Interval(x, ..) => Some(*x),
         _ => None,

@@ -1,7 +1,7 @@
 //! Accepting results: once, whole, and on the disk before the next trial starts.
 
 use super::queue::{Accepted, Job, Kind, Lease, end_attempt, fence};
-use super::{Store, blob, noise, now_ms};
+use super::{Store, blob, changes, noise, now_ms};
 use crate::error::{Error, Result};
 use crate::record::{Judgement, Series, TrialRecord};
 use serde::{Deserialize, Serialize};
@@ -100,6 +100,7 @@ impl Store {
             .await
             .map_err(explain)?;
             claim_frames_hash(&mut tx, &answer_id, &judgement.frames_hash).await.map_err(explain)?;
+            changes::judged(&mut tx, &lease.job.target).await.map_err(explain)?;
         }
         tx.commit().await.map_err(explain)?;
         self.relax(connection).await?;

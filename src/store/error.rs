@@ -1,6 +1,6 @@
 //! SQLite's result codes as sentences that name the file and say what to do.
 
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use sqlx::migrate::MigrateError;
 use std::path::Path;
 
@@ -52,7 +52,7 @@ pub fn explain(path: &Path, doing: &str, e: &sqlx::Error) -> Error {
         ),
         _ => (format!("{doing}: {e}"), String::new()),
     };
-    let error = Error::new(message).in_file(path);
+    let error = Error::new(message).in_file(path).kind(ErrorKind::Unavailable);
     if help.is_empty() { error } else { error.help(help) }
 }
 

@@ -4,7 +4,7 @@ use super::Store;
 use crate::error::Result;
 use crate::record::{Environment, Judgement};
 use rayon::prelude::*;
-use sqlx::FromRow;
+use sqlx::{AssertSqlSafe, FromRow};
 use std::collections::{BTreeMap, HashMap};
 
 #[derive(FromRow, Clone)]
@@ -30,42 +30,68 @@ pub(super) struct SeriesRow {
     pub data: Vec<u8>,
 }
 
+/// Of which measurements rows are read.
+#[derive(Clone, Copy)]
+pub(super) enum Scope<'a> {
+    Study(i64),
+    /// A JSON list of measurement ids.
+    Runs(&'a str),
+}
+
+impl Scope<'_> {
+    /// The sub-query that holds their ids; it has one placeholder.
+    fn ids(self) -> &'static str {
+        match self {
+            Scope::Study(_) => "(SELECT measurement_id FROM study_runs WHERE study_id = $1)",
+            Scope::Runs(_) => "(SELECT value FROM json_each($1))",
+        }
+    }
+}
+
+/// `$1` of [`Scope::ids`].
+macro_rules! bind_scope {
+    ($query:expr, $scope:expr) => {
+        match $scope {
+            Scope::Study(id) => $query.bind(id),
+            Scope::Runs(ids) => $query.bind(ids),
+        }
+    };
+}
+
 impl Store {
-    pub(super) async fn trials_of(&self, study_id: i64) -> Result<HashMap<String, Vec<TrialRow>>> {
-        let rows: Vec<TrialRow> = sqlx::query_as(
-            "SELECT measurement_id, repeat_index, take, total_cull_ns, build_ns, prepare_ns, load_ns, peak_rss_bytes, \
-             noise, noisy FROM trials WHERE measurement_id IN (SELECT measurement_id FROM study_runs WHERE study_id = $1) \
+    pub(super) async fn trials_of(&self, scope: Scope<'_>) -> Result<HashMap<String, Vec<TrialRow>>> {
+        let sql = format!(
+            "SELECT measurement_id, repeat_index, take, total_cull_ns, build_ns, prepare_ns, load_ns, \
+             peak_rss_bytes, noise, noisy FROM trials WHERE measurement_id IN {} \
              ORDER BY measurement_id, repeat_index, take",
-        )
-        .bind(study_id)
-        .fetch_all(&self.readers)
-        .await
-        .map_err(|e| self.explain("reading trials", &e))?;
+            scope.ids()
+        );
+        let rows: Vec<TrialRow> = bind_scope!(sqlx::query_as(AssertSqlSafe(sql)), scope)
+            .fetch_all(&self.readers)
+            .await
+            .map_err(|e| self.explain("reading trials", &e))?;
         Ok(group(rows, |r| r.measurement_id.clone()))
     }
 
-    pub(super) async fn series_of(&self, study_id: i64) -> Result<HashMap<String, Vec<SeriesRow>>> {
-        let rows: Vec<SeriesRow> = sqlx::query_as(
+    pub(super) async fn series_of(&self, scope: Scope<'_>) -> Result<HashMap<String, Vec<SeriesRow>>> {
+        let sql = format!(
             "SELECT measurement_id, repeat_index, take, name, data FROM series WHERE role = 'series' AND \
-             measurement_id IN (SELECT measurement_id FROM study_runs WHERE study_id = $1) ORDER BY measurement_id, \
-             repeat_index, take, role, ordinal",
-        )
-        .bind(study_id)
-        .fetch_all(&self.readers)
-        .await
-        .map_err(|e| self.explain("reading series", &e))?;
+             measurement_id IN {} ORDER BY measurement_id, repeat_index, take, role, ordinal",
+            scope.ids()
+        );
+        let rows: Vec<SeriesRow> = bind_scope!(sqlx::query_as(AssertSqlSafe(sql)), scope)
+            .fetch_all(&self.readers)
+            .await
+            .map_err(|e| self.explain("reading series", &e))?;
         Ok(group(rows, |r| r.measurement_id.clone()))
     }
 
-    pub(super) async fn counters_of(&self, study_id: i64) -> Result<HashMap<String, BTreeMap<String, f64>>> {
-        let rows: Vec<(String, String, f64)> = sqlx::query_as(
-            "SELECT measurement_id, name, value FROM counters WHERE measurement_id IN \
-             (SELECT measurement_id FROM study_runs WHERE study_id = $1)",
-        )
-        .bind(study_id)
-        .fetch_all(&self.readers)
-        .await
-        .map_err(|e| self.explain("reading counters", &e))?;
+    pub(super) async fn counters_of(&self, scope: Scope<'_>) -> Result<HashMap<String, BTreeMap<String, f64>>> {
+        let sql = format!("SELECT measurement_id, name, value FROM counters WHERE measurement_id IN {}", scope.ids());
+        let rows: Vec<(String, String, f64)> = bind_scope!(sqlx::query_as(AssertSqlSafe(sql)), scope)
+            .fetch_all(&self.readers)
+            .await
+            .map_err(|e| self.explain("reading counters", &e))?;
         let mut out: HashMap<String, BTreeMap<String, f64>> = HashMap::new();
         for (id, name, value) in rows {
             out.entry(id).or_default().insert(name, value);
@@ -73,15 +99,17 @@ impl Store {
         Ok(out)
     }
 
-    pub(super) async fn judgements_of(&self, study_id: i64) -> Result<HashMap<String, Judgement>> {
-        let rows: Vec<(String, String)> = sqlx::query_as(
-            "SELECT judgement_id, record_json FROM judgements WHERE judgement_id IN \
-             (SELECT judgement_id FROM study_runs WHERE study_id = $1)",
-        )
-        .bind(study_id)
-        .fetch_all(&self.readers)
-        .await
-        .map_err(|e| self.explain("reading judgements", &e))?;
+    /// By judgement: of a study, or of the judgements in a JSON list of their own ids.
+    pub(super) async fn judgements_of(&self, scope: Scope<'_>) -> Result<HashMap<String, Judgement>> {
+        let ids = match scope {
+            Scope::Study(_) => "(SELECT judgement_id FROM study_runs WHERE study_id = $1)",
+            Scope::Runs(_) => scope.ids(),
+        };
+        let sql = format!("SELECT judgement_id, record_json FROM judgements WHERE judgement_id IN {ids}");
+        let rows: Vec<(String, String)> = bind_scope!(sqlx::query_as(AssertSqlSafe(sql)), scope)
+            .fetch_all(&self.readers)
+            .await
+            .map_err(|e| self.explain("reading judgements", &e))?;
         rows.into_par_iter().map(|(id, json)| Ok((id, self.parse(&json, "a judgement")?))).collect()
     }
 

@@ -8,29 +8,47 @@
 //! - `queue`: jobs are leased with an epoch, renewed, given back, accepted once;
 //! - `settle`: what the accepted trials and the judgement make of a measurement;
 //! - `read`: results for reports, queries and comparisons;
-//! - `archive`, `compact`: one-file exchange, and size.
+//! - `control`: pause, resume, cancel, retry, delete; whose turn it is;
+//! - `changes`, `facts`: what is new since a reader looked, and what it computed of it;
+//! - `tokens`, `uploads`: who may ask, and files that users sent;
+//! - `archive`, `compact`, `backup`: one-file exchange, size, a copy of all of it.
 
 mod accept;
 pub mod archive;
 pub mod artifacts;
+pub mod backup;
 mod blob;
+mod changes;
 pub mod compact;
+pub mod control;
 mod error;
+pub mod facts;
 mod fetch;
+pub mod known;
+mod lease;
 mod noise;
+mod open_runs;
+mod overview;
 mod owner;
 pub mod queue;
 pub mod read;
 mod rows;
+pub mod run_page;
 mod series;
 pub mod settle;
 pub mod submit;
+pub mod tokens;
+pub mod uploads;
 
 use crate::error::{Error, Result};
+use sqlx::ConnectOptions;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+pub use control::StudyState;
+pub use lease::Pool;
+pub use overview::{Counted, JobCounts, Overview, RunCounts};
 pub use queue::{Accepted, Job, Kind, Lease, Left, Outcome};
 pub use read::{Detail, StudyInfo};
 pub use series::read_series;
@@ -91,7 +109,8 @@ impl Store {
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Normal)
             .busy_timeout(BUSY_TIMEOUT)
-            .statement_cache_capacity(200);
+            .statement_cache_capacity(200)
+            .disable_statement_logging();
         let pool = |connections| {
             SqlitePoolOptions::new()
                 .max_connections(connections)
@@ -206,10 +225,11 @@ pub fn read_results(db: &Path, study: &str, detail: Detail) -> Result<crate::res
     })
 }
 
-/// How progress and logs call a run: `scene: structure × culling`, further axes where they are not the usual ones.
-pub fn label(spec: &crate::record::RunSpec) -> String {
+/// How progress and logs call a run: `scene: structure × culling` by their short labels,
+/// further axes where they are not the usual ones.
+fn label(spec: &crate::record::RunSpec, structure: &str, culling: &str) -> String {
     let further: String = spec.further().iter().map(|l| format!(" × {l}")).collect();
-    format!("{}: {} × {}{further}", spec.scene.name, spec.structure, spec.culling_label())
+    format!("{}: {structure} × {culling}{further}", spec.scene.name)
 }
 
 /// Milliseconds since 1970, UTC.

@@ -1,6 +1,8 @@
 //! Was the machine quiet during a trial? Its sentinel against what is usual
 //! here, and what the scheduler may have taken from it.
 
+use super::Store;
+use crate::error::Result;
 use crate::record::TrialRecord;
 use crate::stats;
 use sqlx::{Sqlite, Transaction};
@@ -33,6 +35,26 @@ pub(super) async fn of(tx: &mut Transaction<'_, Sqlite>, record: &TrialRecord) -
     let known = earlier.len() >= SENTINELS_NEEDED;
     let noise = if known { sentinel_ns(record) / stats::quantile(&earlier, USUAL) } else { 1.0 };
     Ok((noise, noise > NOISY_SENTINEL || interrupted(record)))
+}
+
+/// Trials that tell how quiet a machine is these days.
+const RECENT: i64 = 100;
+
+impl Store {
+    /// Share of the last trials on a class of machines that were disturbed; none before the first.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn recent_noise(&self, machine_class: &str) -> Result<Option<f64>> {
+        sqlx::query_scalar(
+            "SELECT avg(noisy) FROM (SELECT noisy FROM trials WHERE machine_class = $1 ORDER BY accepted_ms DESC LIMIT $2)",
+        )
+        .bind(machine_class)
+        .bind(RECENT)
+        .fetch_one(&self.readers)
+        .await
+        .map_err(|e| self.explain("reading trials", &e))
+    }
 }
 
 pub(super) fn sentinel_ns(record: &TrialRecord) -> f64 {

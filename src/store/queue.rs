@@ -4,7 +4,7 @@
 
 use super::{Store, now_ms, owner};
 use crate::error::{Error, Result};
-use crate::record::RunSpec;
+use crate::record::{RepeatPolicy, RunSpec};
 use serde::{Deserialize, Serialize};
 use sqlx::{Sqlite, Transaction};
 use std::time::Duration;
@@ -46,6 +46,11 @@ pub struct Lease {
     pub job: Job,
     pub epoch: i64,
     pub spec: RunSpec,
+    /// How progress and logs call the run.
+    pub label: String,
+    /// On whose behalf it is done, and how that study repeats and limits its trials.
+    pub study_id: i64,
+    pub policy: RepeatPolicy,
 }
 
 /// How an attempt ended without a result.
@@ -74,77 +79,11 @@ pub enum Accepted {
     Fenced,
 }
 
-const CLAIM_TRIAL: &str = "UPDATE jobs SET state = 'leased', owner = $2, epoch = epoch + 1, attempts = attempts + 1, \
-    lease_until_ms = $3 WHERE id = (SELECT j.id FROM jobs j WHERE j.kind = 'trial' AND j.state = 'queued' AND EXISTS \
-    (SELECT 1 FROM study_runs r WHERE r.measurement_id = j.target AND r.study_id = $1) ORDER BY j.order_key LIMIT 1) \
-    RETURNING id, target, repeat_index, take, epoch";
-
-/// While one worker computes a truth, another judgement that needs the same one
-/// would compute it twice: it waits until somebody has finished with that truth.
-const CLAIM_JUDGE: &str = "UPDATE jobs SET state = 'leased', owner = $2, epoch = epoch + 1, attempts = attempts + 1, \
-    lease_until_ms = $3 WHERE id = (SELECT j.id FROM jobs j WHERE j.kind = 'judge' AND j.state = 'queued' AND EXISTS \
-    (SELECT 1 FROM study_runs r WHERE r.judgement_id = j.target AND r.study_id = $1) AND NOT (EXISTS \
-    (SELECT 1 FROM jobs b WHERE b.kind = 'judge' AND b.group_key = j.group_key AND b.state = 'leased') AND NOT EXISTS \
-    (SELECT 1 FROM jobs b WHERE b.kind = 'judge' AND b.group_key = j.group_key AND b.state = 'done')) \
-    ORDER BY j.order_key LIMIT 1) RETURNING id, target, repeat_index, take, epoch";
-
 /// Since the job was last queued anew: `attempts` then began at nought, epochs never do.
 const CRASHES: &str = "SELECT count(*) FROM attempts a JOIN jobs j ON j.id = a.job_id \
     WHERE a.job_id = $1 AND a.outcome = 'crashed' AND a.epoch > j.epoch - j.attempts";
 
 impl Store {
-    /// Leases the next job of `kind` in `study_id`, if one waits.
-    ///
-    /// # Errors
-    /// When the database fails.
-    pub async fn lease(&self, study_id: i64, kind: Kind) -> Result<Option<Lease>> {
-        self.lease_for(study_id, kind, LEASE).await
-    }
-
-    /// As [`Store::lease`] with another term.
-    ///
-    /// # Errors
-    /// When the database fails.
-    pub async fn lease_for(&self, study_id: i64, kind: Kind, term: Duration) -> Result<Option<Lease>> {
-        let explain = |e: sqlx::Error| self.explain("a lease", &e);
-        let mut tx = self.begin("a lease").await?;
-        reap(&mut tx).await.map_err(explain)?;
-        let (now, me) = (now_ms(), owner::this());
-        let row: Option<(i64, String, i64, i64, i64)> =
-            sqlx::query_as(if kind == Kind::Trial { CLAIM_TRIAL } else { CLAIM_JUDGE })
-                .bind(study_id)
-                .bind(me)
-                .bind(now + term.as_millis() as i64)
-                .fetch_optional(&mut *tx)
-                .await
-                .map_err(explain)?;
-        let Some((id, target, repeat, take, epoch)) = row else {
-            tx.commit().await.map_err(explain)?;
-            return Ok(None);
-        };
-        sqlx::query("INSERT INTO attempts (job_id, epoch, owner, started_ms) VALUES ($1, $2, $3, $4)")
-            .bind(id)
-            .bind(epoch)
-            .bind(me)
-            .bind(now)
-            .execute(&mut *tx)
-            .await
-            .map_err(explain)?;
-        let (json,): (String,) = sqlx::query_as(match kind {
-            Kind::Trial => "SELECT spec_json FROM study_runs WHERE study_id = $1 AND measurement_id = $2 LIMIT 1",
-            Kind::Judge => "SELECT spec_json FROM study_runs WHERE study_id = $1 AND judgement_id = $2 LIMIT 1",
-        })
-        .bind(study_id)
-        .bind(&target)
-        .fetch_one(&mut *tx)
-        .await
-        .map_err(explain)?;
-        tx.commit().await.map_err(explain)?;
-        let spec = self.parse(&json, "a run")?;
-        let job = Job { id, kind, target, repeat: repeat as u32, take: take as u32 };
-        Ok(Some(Lease { job, epoch, spec }))
-    }
-
     /// Renews a lease. False when it has passed to another: stop the work.
     ///
     /// # Errors
@@ -275,7 +214,7 @@ impl Store {
 }
 
 /// Leases that ran out go back to the queue, or fail when lost too often.
-async fn reap(tx: &mut Transaction<'_, Sqlite>) -> sqlx::Result<u64> {
+pub(super) async fn reap(tx: &mut Transaction<'_, Sqlite>) -> sqlx::Result<u64> {
     let expired: Vec<(i64, i64)> =
         sqlx::query_as("SELECT id, epoch FROM jobs WHERE state = 'leased' AND lease_until_ms < $1")
             .bind(now_ms())

@@ -1,10 +1,10 @@
 //! Results of a study, put together from rows. Medians over trials are computed
 //! here from the stored series, so that nothing derived is stored twice.
 
-use super::fetch::{SeriesRow, TrialRow};
+use super::fetch::{Scope, SeriesRow, TrialRow};
 use super::{Store, blob};
-use crate::error::{Error, Result, did_you_mean};
-use crate::record::{Judgement, RepeatPolicy, RunSpec, observed_class};
+use crate::error::{Error, ErrorKind, Result, did_you_mean};
+use crate::record::{Judgement, observed_class};
 use crate::results::{Excluded, RunResult, RunStatus, StudyResults, TrialSummary};
 use crate::stats;
 use rayon::prelude::*;
@@ -33,16 +33,6 @@ pub struct StudyInfo {
     pub done: u64,
 }
 
-/// What is known of a measurement: for `plan`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct KnownRun {
-    pub status: RunStatus,
-    pub reason: Option<String>,
-    pub repeats: u32,
-    /// Median wall time of a trial's process; none before the first.
-    pub trial_wall_ns: Option<f64>,
-}
-
 #[derive(FromRow)]
 pub(super) struct StudyRow {
     pub id: i64,
@@ -51,9 +41,9 @@ pub(super) struct StudyRow {
     manifest_toml: String,
     claims_json: String,
     sweeps_json: String,
-    policy_json: String,
+    pub policy_json: String,
     consolidate_frames: i64,
-    machine_class: String,
+    pub machine_class: String,
     created_ms: i64,
 }
 
@@ -71,6 +61,10 @@ struct RunRow {
     reason: Option<String>,
     stop_reason: Option<String>,
 }
+
+const RUN_ROWS: &str = "SELECT r.measurement_id, r.judgement_id, r.spec_json, r.structure_label, r.culling_label, \
+    r.walk_label, m.answer_id, m.machine_class, m.status, m.reason, m.stop_reason FROM study_runs r \
+    JOIN measurements m ON m.measurement_id = r.measurement_id WHERE r.study_id = $1";
 
 pub(super) fn status_of(text: &str) -> RunStatus {
     match text {
@@ -123,32 +117,12 @@ impl Store {
     pub async fn results_with(&self, study: &str, detail: Detail) -> Result<StudyResults> {
         let explain = |e: sqlx::Error| self.explain("reading the study", &e);
         let study = self.find(study).await?;
-        let rows: Vec<RunRow> = sqlx::query_as(
-            "SELECT r.measurement_id, r.judgement_id, r.spec_json, r.structure_label, r.culling_label, r.walk_label, \
-             m.answer_id, m.machine_class, m.status, m.reason, m.stop_reason FROM study_runs r \
-             JOIN measurements m ON m.measurement_id = r.measurement_id WHERE r.study_id = $1 ORDER BY r.ordinal",
-        )
-        .bind(study.id)
-        .fetch_all(&self.readers)
-        .await
-        .map_err(explain)?;
-        let trials = self.trials_of(study.id).await?;
-        let counters = self.counters_of(study.id).await?;
-        let judgements = self.judgements_of(study.id).await?;
-        let series = if detail == Detail::Frames { self.series_of(study.id).await? } else { HashMap::new() };
-        let runs = rows
-            .par_iter()
-            .map(|row| {
-                let id = row.measurement_id.as_str();
-                self.run_of(
-                    row,
-                    trials.get(id).map_or(&[][..], Vec::as_slice),
-                    series.get(id).map_or(&[][..], Vec::as_slice),
-                    counters.get(id),
-                    judgements.get(&row.judgement_id),
-                )
-            })
-            .collect::<Result<Vec<_>>>()?;
+        let rows: Vec<RunRow> = sqlx::query_as(sqlx::AssertSqlSafe(format!("{RUN_ROWS} ORDER BY r.ordinal")))
+            .bind(study.id)
+            .fetch_all(&self.readers)
+            .await
+            .map_err(explain)?;
+        let runs = self.runs_of(&rows, Scope::Study(study.id), Scope::Study(study.id), detail).await?;
         let excluded: Vec<(String, String, i64)> =
             sqlx::query_as("SELECT cell, why, cells FROM excluded WHERE study_id = $1 ORDER BY ordinal")
                 .bind(study.id)
@@ -171,72 +145,55 @@ impl Store {
         })
     }
 
+    /// Some runs of a study by their measurements, in the order of the matrix.
+    ///
+    /// # Errors
+    /// When there is no such study, a row cannot be read or the database fails.
+    pub async fn some_results(&self, study_id: i64, ids: &[String], detail: Detail) -> Result<Vec<RunResult>> {
+        let list = serde_json::to_string(ids).expect("ids are text");
+        let sql = format!("{RUN_ROWS} AND r.measurement_id IN (SELECT value FROM json_each($2)) ORDER BY r.ordinal");
+        let rows: Vec<RunRow> = sqlx::query_as(sqlx::AssertSqlSafe(sql))
+            .bind(study_id)
+            .bind(&list)
+            .fetch_all(&self.readers)
+            .await
+            .map_err(|e| self.explain("reading the study", &e))?;
+        let judged: Vec<&str> = rows.iter().map(|r| r.judgement_id.as_str()).collect();
+        let judged = serde_json::to_string(&judged).expect("ids are text");
+        self.runs_of(&rows, Scope::Runs(&list), Scope::Runs(&judged), detail).await
+    }
+
+    async fn runs_of(
+        &self,
+        rows: &[RunRow],
+        scope: Scope<'_>,
+        judged: Scope<'_>,
+        detail: Detail,
+    ) -> Result<Vec<RunResult>> {
+        let trials = self.trials_of(scope).await?;
+        let counters = self.counters_of(scope).await?;
+        let judgements = self.judgements_of(judged).await?;
+        let series = if detail == Detail::Frames { self.series_of(scope).await? } else { HashMap::new() };
+        rows.par_iter()
+            .map(|row| {
+                let id = row.measurement_id.as_str();
+                self.run_of(
+                    row,
+                    trials.get(id).map_or(&[][..], Vec::as_slice),
+                    series.get(id).map_or(&[][..], Vec::as_slice),
+                    counters.get(id),
+                    judgements.get(&row.judgement_id),
+                )
+            })
+            .collect()
+    }
+
     /// The claims of a study, as the JSON that was submitted.
     ///
     /// # Errors
     /// When there is no such study or the database fails.
     pub async fn claims_json(&self, study: &str) -> Result<String> {
         Ok(self.find(study).await?.claims_json)
-    }
-
-    /// How a study is repeated, and on which class of machine.
-    ///
-    /// # Errors
-    /// When there is no such study or the database fails.
-    pub async fn policy(&self, study: &str) -> Result<(RepeatPolicy, String)> {
-        let row = self.find(study).await?;
-        Ok((self.parse(&row.policy_json, "a policy")?, row.machine_class))
-    }
-
-    /// What is known of each of `ids`; those never seen are left out. For plans.
-    ///
-    /// # Errors
-    /// When the database fails.
-    pub async fn known_runs(&self, ids: &[String]) -> Result<HashMap<String, KnownRun>> {
-        let mut out = HashMap::new();
-        for chunk in ids.chunks(1000) {
-            let mut q = sqlx::QueryBuilder::<sqlx::Sqlite>::new(
-                "SELECT m.measurement_id, m.status, m.reason, m.repeats, t.wall_ns FROM measurements m \
-                 LEFT JOIN trials t ON t.measurement_id = m.measurement_id WHERE m.measurement_id IN (",
-            );
-            let mut list = q.separated(", ");
-            for id in chunk {
-                list.push_bind(id.clone());
-            }
-            q.push(")");
-            type Row = (String, String, Option<String>, i64, Option<i64>);
-            let rows: Vec<Row> = q
-                .build_query_as()
-                .fetch_all(&self.readers)
-                .await
-                .map_err(|e| self.explain("reading what is done", &e))?;
-            let mut walls: HashMap<String, Vec<f64>> = HashMap::new();
-            for (id, status, reason, repeats, wall) in rows {
-                walls.entry(id.clone()).or_default().extend(wall.map(|w| w as f64));
-                let known =
-                    KnownRun { status: status_of(&status), reason, repeats: repeats as u32, trial_wall_ns: None };
-                out.insert(id, known);
-            }
-            for (id, walls) in walls.into_iter().filter(|(_, w)| !w.is_empty()) {
-                out.get_mut(&id).expect("inserted above").trial_wall_ns = Some(stats::median(&walls));
-            }
-        }
-        Ok(out)
-    }
-
-    /// The cells of a stored study as they were submitted, to tell what changed.
-    ///
-    /// # Errors
-    /// When there is no such study or the database fails.
-    pub async fn specs(&self, study: &str) -> Result<Vec<RunSpec>> {
-        let study = self.find(study).await?;
-        let rows: Vec<String> =
-            sqlx::query_scalar("SELECT spec_json FROM study_runs WHERE study_id = $1 ORDER BY ordinal")
-                .bind(study.id)
-                .fetch_all(&self.readers)
-                .await
-                .map_err(|e| self.explain("reading the study", &e))?;
-        rows.par_iter().map(|json| self.parse(json, "a run")).collect()
     }
 
     pub(super) async fn find(&self, study: &str) -> Result<StudyRow> {
@@ -266,7 +223,10 @@ impl Store {
             _ if names.is_empty() => "it holds no study yet: `cullmark run experiments/quick.toml`".to_string(),
             _ => format!("it holds: {}", names.join(", ")),
         };
-        Err(Error::new(format!("there is no study `{study}` in the database")).in_file(&self.path).help(help))
+        Err(Error::new(format!("there is no study `{study}` in the database"))
+            .in_file(&self.path)
+            .help(help)
+            .kind(ErrorKind::Missing))
     }
 
     fn run_of(

@@ -1,7 +1,7 @@
 //! New rows of a submission, many a statement.
 
-use super::now_ms;
 use super::submit::{CHUNK, Ids, Submission};
+use super::{changes, now_ms};
 use sqlx::{QueryBuilder, Sqlite, Transaction};
 
 /// Trials are blocked by scene; within it one repeat of every run comes before
@@ -14,13 +14,19 @@ pub(super) fn trial_order(block: i64, repeat: u32, seed: u64, measurement_id: &s
     (block.min(0x3fff) << 48) | (i64::from(repeat.min(0xffff)) << 32) | i64::from(draw)
 }
 
+/// A cancelled job waits again; one that waits for a study that does not want it now
+/// (paused, cancelled, deleted) becomes ours.
+const TAKE_OVER: &str = " ON CONFLICT (kind, target, repeat_index, take) DO UPDATE SET state = 'queued', \
+    study_id = excluded.study_id WHERE jobs.state = 'cancelled' OR (jobs.state = 'queued' AND jobs.study_id NOT IN \
+    (SELECT id FROM studies WHERE state = 'active'))";
+
 pub(super) async fn insert_measurements(
     tx: &mut Transaction<'_, Sqlite>,
     s: &Submission,
     ids: &[Ids],
     new: &[usize],
 ) -> sqlx::Result<()> {
-    let now = now_ms();
+    let (now, changed) = (now_ms(), changes::tick(tx).await?);
     for chunk in new.chunks(CHUNK) {
         QueryBuilder::<Sqlite>::new("INSERT INTO answers (answer_id, created_ms) ")
             .push_values(chunk, |mut row, i| {
@@ -32,14 +38,14 @@ pub(super) async fn insert_measurements(
             .await?;
         QueryBuilder::<Sqlite>::new(
             "INSERT INTO measurements (measurement_id, answer_id, judgement_id, machine_class, series, protocol_json, \
-             status, created_ms) ",
+             status, created_ms, changed) ",
         )
         .push_values(chunk, |mut row, i| {
             let (id, spec) = (&ids[*i], &s.cells[*i].spec);
             row.push_bind(id.measurement.clone()).push_bind(id.answer.clone()).push_bind(id.judgement.clone());
             row.push_bind(s.machine_class.clone()).push_bind(i64::from(spec.series));
             row.push_bind(serde_json::to_string(&spec.protocol).expect("a protocol is plain data"));
-            row.push_bind("pending").push_bind(now);
+            row.push_bind("pending").push_bind(now).push_bind(changed);
         })
         .push(" ON CONFLICT DO NOTHING")
         .build()
@@ -51,6 +57,7 @@ pub(super) async fn insert_measurements(
 
 pub(super) async fn insert_judge_jobs(
     tx: &mut Transaction<'_, Sqlite>,
+    study_id: i64,
     ids: &[Ids],
     blocks: &[i64],
     judge: &[usize],
@@ -58,14 +65,15 @@ pub(super) async fn insert_judge_jobs(
     let mut added = 0;
     for chunk in judge.chunks(CHUNK) {
         added += QueryBuilder::<Sqlite>::new(
-            "INSERT INTO jobs (kind, target, repeat_index, take, group_key, order_key, state) ",
+            "INSERT INTO jobs (kind, target, repeat_index, take, group_key, order_key, state, study_id) ",
         )
         .push_values(chunk, |mut row, i| {
             let id = &ids[*i];
             row.push_bind("judge").push_bind(id.judgement.clone()).push_bind(0i64).push_bind(0i64);
             row.push_bind(id.truth.clone()).push_bind((blocks[*i] << 48) | *i as i64).push_bind("queued");
+            row.push_bind(study_id);
         })
-        .push(" ON CONFLICT (kind, target, repeat_index, take) DO UPDATE SET state = 'queued' WHERE jobs.state = 'cancelled'")
+        .push(TAKE_OVER)
         .build()
         .execute(&mut **tx)
         .await?
@@ -76,6 +84,7 @@ pub(super) async fn insert_judge_jobs(
 
 pub(super) async fn insert_trial_jobs(
     tx: &mut Transaction<'_, Sqlite>,
+    study_id: i64,
     s: &Submission,
     ids: &[Ids],
     blocks: &[i64],
@@ -90,13 +99,14 @@ pub(super) async fn insert_trial_jobs(
     let mut added = 0;
     for chunk in rows.chunks(CHUNK) {
         added += QueryBuilder::<Sqlite>::new(
-            "INSERT INTO jobs (kind, target, repeat_index, take, group_key, order_key, state) ",
+            "INSERT INTO jobs (kind, target, repeat_index, take, group_key, order_key, state, study_id) ",
         )
         .push_values(chunk, |mut row, (order, i, n)| {
             row.push_bind("trial").push_bind(ids[*i].measurement.clone()).push_bind(i64::from(*n)).push_bind(0i64);
             row.push_bind(s.cells[*i].spec.scene.fingerprint.clone()).push_bind(*order).push_bind("queued");
+            row.push_bind(study_id);
         })
-        .push(" ON CONFLICT (kind, target, repeat_index, take) DO UPDATE SET state = 'queued' WHERE jobs.state = 'cancelled'")
+        .push(TAKE_OVER)
         .build()
         .execute(&mut **tx)
         .await?

@@ -3,9 +3,9 @@
 //! so that it can be asked again after any interruption.
 
 use super::accept::Work;
-use super::{Store, now_ms, rows};
+use super::{Store, changes, now_ms, rows};
 use crate::error::Result;
-use crate::record::{RepeatPolicy, RunSpec};
+use crate::record::RepeatPolicy;
 use crate::results::RunStatus;
 use crate::stats;
 use sqlx::{Sqlite, Transaction};
@@ -25,6 +25,17 @@ pub struct Settled {
     pub trials_added: u32,
     /// Trials no longer needed because the run failed or is wrong.
     pub trials_cancelled: u32,
+}
+
+impl Settled {
+    const PENDING: Settled = Settled {
+        status: RunStatus::Pending,
+        reason: None,
+        stop_reason: None,
+        repeats: 0,
+        trials_added: 0,
+        trials_cancelled: 0,
+    };
 }
 
 struct Trial {
@@ -51,59 +62,6 @@ impl Store {
         Ok(settled)
     }
 
-    /// Measurements of the study that are not finished; those that wait for `judgement_id` if given.
-    ///
-    /// # Errors
-    /// When the database fails.
-    pub async fn unsettled(&self, study_id: i64, judgement_id: Option<&str>) -> Result<Vec<String>> {
-        sqlx::query_scalar(
-            "SELECT m.measurement_id FROM measurements m JOIN study_runs r ON r.measurement_id = m.measurement_id \
-             WHERE r.study_id = $1 AND m.status = 'pending' AND ($2 IS NULL OR m.judgement_id = $2) \
-             GROUP BY m.measurement_id ORDER BY min(r.ordinal)",
-        )
-        .bind(study_id)
-        .bind(judgement_id)
-        .fetch_all(&self.writer)
-        .await
-        .map_err(|e| self.explain("reading the study", &e))
-    }
-
-    /// Measurements of the study about which something is to be decided: nobody works on
-    /// them any more, or what ends them is known. The others are settled as their trials come in.
-    ///
-    /// # Errors
-    /// When the database fails.
-    pub async fn loose_ends(&self, study_id: i64) -> Result<Vec<String>> {
-        sqlx::query_scalar(
-            "SELECT m.measurement_id FROM measurements m JOIN study_runs r ON r.measurement_id = m.measurement_id \
-             WHERE r.study_id = $1 AND m.status = 'pending' AND (NOT EXISTS (SELECT 1 FROM jobs j WHERE \
-             j.kind = 'trial' AND j.target = m.measurement_id AND j.state IN ('queued', 'leased')) OR EXISTS \
-             (SELECT 1 FROM judgements g WHERE g.judgement_id = m.judgement_id AND g.wrong IS NOT NULL) OR EXISTS \
-             (SELECT 1 FROM jobs j WHERE j.kind = 'trial' AND j.target = m.measurement_id AND j.state = 'failed') OR \
-             EXISTS (SELECT 1 FROM jobs j WHERE j.kind = 'judge' AND j.target = m.judgement_id AND j.state = 'failed')) \
-             GROUP BY m.measurement_id ORDER BY min(r.ordinal)",
-        )
-        .bind(study_id)
-        .fetch_all(&self.writer)
-        .await
-        .map_err(|e| self.explain("reading the study", &e))
-    }
-
-    /// How the run is called in progress and logs.
-    ///
-    /// # Errors
-    /// When the study has no such run or the database fails.
-    pub async fn label_of(&self, study_id: i64, measurement_id: &str) -> Result<String> {
-        let json: String =
-            sqlx::query_scalar("SELECT spec_json FROM study_runs WHERE study_id = $1 AND measurement_id = $2 LIMIT 1")
-                .bind(study_id)
-                .bind(measurement_id)
-                .fetch_one(&self.writer)
-                .await
-                .map_err(|e| self.explain("reading the study", &e))?;
-        Ok(super::label(&self.parse::<RunSpec>(&json, "a run")?))
-    }
-
     async fn decide(
         &self,
         tx: &mut Transaction<'_, Sqlite>,
@@ -112,12 +70,14 @@ impl Store {
         policy: &RepeatPolicy,
     ) -> Result<Settled> {
         let explain = |e: sqlx::Error| self.explain("a decision", &e);
-        let (answer_id, judgement_id): (String, String) =
+        let known: Option<(String, String)> =
             sqlx::query_as("SELECT answer_id, judgement_id FROM measurements WHERE measurement_id = $1")
                 .bind(measurement_id)
-                .fetch_one(&mut **tx)
+                .fetch_optional(&mut **tx)
                 .await
                 .map_err(explain)?;
+        // Deleted while somebody worked on it: nothing is left to decide.
+        let Some((answer_id, judgement_id)) = known else { return Ok(Settled::PENDING) };
         let rows: Vec<TrialRow> = sqlx::query_as(
             "SELECT repeat_index, take, total_cull_ns, work_json, noisy, noise, wall_ns FROM trials \
              WHERE measurement_id = $1 ORDER BY repeat_index, take",
@@ -131,14 +91,7 @@ impl Store {
             trials.push(Trial { repeat, take, total_ns, work: self.parse(&work, "a trial")?, noisy: noisy != 0 });
         }
         let repeats = trials.iter().filter(|t| t.take == 0).count() as u32;
-        let pending = Settled {
-            status: RunStatus::Pending,
-            reason: None,
-            stop_reason: None,
-            repeats,
-            trials_added: 0,
-            trials_cancelled: 0,
-        };
+        let pending = Settled { repeats, ..Settled::PENDING };
         let end = |status, reason: String| Settled { status, reason: Some(reason), ..pending.clone() };
 
         let judgement: Option<(Option<String>, String)> =
@@ -184,7 +137,7 @@ impl Store {
             return Ok(Settled { trials_added: added, ..pending });
         }
         let totals: Vec<f64> = best_takes(&trials).iter().map(|t| t.total_ns).collect();
-        let relative_ci = relative_ci(&totals, policy.seed);
+        let relative_ci = relative_ci(&totals);
         let stop_reason = match policy.relative_ci {
             None => format!("{repeats} repeats as asked"),
             Some(asked) if relative_ci <= asked => {
@@ -259,24 +212,27 @@ impl Store {
         take: u32,
     ) -> Result<()> {
         let explain = |e: sqlx::Error| self.explain("another trial", &e);
-        let (block,): (i64,) =
-            sqlx::query_as("SELECT block FROM study_runs WHERE study_id = $1 AND measurement_id = $2 LIMIT 1")
+        let block: Option<i64> =
+            sqlx::query_scalar("SELECT block FROM study_runs WHERE study_id = $1 AND measurement_id = $2 LIMIT 1")
                 .bind(study_id)
                 .bind(measurement_id)
-                .fetch_one(&mut **tx)
+                .fetch_optional(&mut **tx)
                 .await
                 .map_err(explain)?;
+        // The study was deleted meanwhile: nobody asks for more.
+        let Some(block) = block else { return Ok(()) };
         // A second take comes when the block's other repeats are through: the disturbance may have passed.
         let round = if take == 0 { repeat } else { 0xffff };
         sqlx::query(
-            "INSERT INTO jobs (kind, target, repeat_index, take, group_key, order_key, state) \
-             VALUES ('trial', $1, $2, $3, '', $4, 'queued') ON CONFLICT (kind, target, repeat_index, take) \
+            "INSERT INTO jobs (kind, target, repeat_index, take, group_key, order_key, state, study_id) \
+             VALUES ('trial', $1, $2, $3, '', $4, 'queued', $5) ON CONFLICT (kind, target, repeat_index, take) \
              DO UPDATE SET state = 'queued' WHERE jobs.state = 'cancelled'",
         )
         .bind(measurement_id)
         .bind(i64::from(repeat))
         .bind(i64::from(take))
         .bind(rows::trial_order(block, round, policy.seed, measurement_id))
+        .bind(study_id)
         .execute(&mut **tx)
         .await
         .map_err(explain)?;
@@ -292,11 +248,11 @@ fn best_takes(trials: &[Trial]) -> Vec<&Trial> {
 
 /// Width of the 95 % bootstrap interval of the median total over that median.
 /// Fewer than three trials say nothing.
-fn relative_ci(totals: &[f64], seed: u64) -> f64 {
+fn relative_ci(totals: &[f64]) -> f64 {
     if totals.len() < 3 {
         return f64::INFINITY;
     }
-    let (low, high) = stats::bootstrap_ci_median(totals, stats::RESAMPLES, seed);
+    let (low, high) = stats::median_ci(totals);
     (high - low) / stats::median(totals)
 }
 
@@ -349,8 +305,8 @@ async fn write(tx: &mut Transaction<'_, Sqlite>, measurement_id: &str, s: &Settl
     };
     let finished = (s.status != RunStatus::Pending).then(now_ms);
     sqlx::query(
-        "UPDATE measurements SET status = $2, reason = $3, stop_reason = $4, repeats = $5, finished_ms = $6 \
-         WHERE measurement_id = $1",
+        "UPDATE measurements SET status = $2, reason = $3, stop_reason = $4, repeats = $5, finished_ms = $6, \
+         changed = $7 WHERE measurement_id = $1",
     )
     .bind(measurement_id)
     .bind(status)
@@ -358,6 +314,7 @@ async fn write(tx: &mut Transaction<'_, Sqlite>, measurement_id: &str, s: &Settl
     .bind(&s.stop_reason)
     .bind(i64::from(s.repeats))
     .bind(finished)
+    .bind(changes::tick(tx).await?)
     .execute(&mut **tx)
     .await?;
     if matches!(s.status, RunStatus::Failed | RunStatus::Wrong) {

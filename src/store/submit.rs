@@ -2,7 +2,7 @@
 //! multi-row inserts. What is finished is skipped, also across studies.
 
 use super::rows::{insert_judge_jobs, insert_measurements, insert_trial_jobs};
-use super::{Store, now_ms};
+use super::{Store, changes, control, now_ms};
 use crate::error::Result;
 use crate::record::{RepeatPolicy, RunSpec};
 use crate::results::Excluded;
@@ -40,6 +40,10 @@ pub struct Submission {
     pub excluded: Vec<Excluded>,
     /// Queue again what failed before.
     pub retry_failed: bool,
+    /// Higher first, where a pool has the choice.
+    pub priority: i64,
+    /// Where files that the manifest names start from.
+    pub folder: String,
 }
 
 /// What a submission found and added. Counts are of runs; a cell that occurs twice counts twice.
@@ -116,6 +120,7 @@ async fn submit(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]) -
         retry_failed(tx, study_id).await?;
     }
     let known = known(tx, ids).await?;
+    let changed = changes::tick(tx).await?;
     let judged: HashSet<String> =
         select_ids(tx, "SELECT judgement_id FROM judgements WHERE judgement_id IN (", ids, |i| &i.judgement).await?;
 
@@ -151,9 +156,10 @@ async fn submit(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]) -
         } else if let Some(k) = known.get(&id.measurement)
             && (k.status == "done" || (!id.judgement.is_empty() && k.judgement != id.judgement))
         {
-            sqlx::query("UPDATE measurements SET status = 'pending', judgement_id = CASE $2 WHEN '' THEN judgement_id ELSE $2 END WHERE measurement_id = $1")
+            sqlx::query("UPDATE measurements SET status = 'pending', judgement_id = CASE $2 WHEN '' THEN judgement_id ELSE $2 END, changed = $3 WHERE measurement_id = $1")
                 .bind(&id.measurement)
                 .bind(&id.judgement)
+                .bind(changed)
                 .execute(&mut **tx)
                 .await?;
         }
@@ -163,8 +169,8 @@ async fn submit(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]) -
         }
     }
     insert_measurements(tx, s, ids, &new).await?;
-    out.jobs_added += insert_judge_jobs(tx, ids, &blocks, &judge).await?;
-    out.jobs_added += insert_trial_jobs(tx, s, ids, &blocks, &open).await?;
+    out.jobs_added += insert_judge_jobs(tx, study_id, ids, &blocks, &judge).await?;
+    out.jobs_added += insert_trial_jobs(tx, study_id, s, ids, &blocks, &open).await?;
     Ok(out)
 }
 
@@ -210,13 +216,14 @@ async fn put_study(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]
             .await?;
     let (study_id,): (i64,) = sqlx::query_as(
         "INSERT INTO studies (name, series, title, manifest_toml, claims_json, policy_json, consolidate_frames, \
-         machine_class, runs_hash, created_ms, submitted_ms, sweeps_json) \
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $10, $11) \
+         machine_class, runs_hash, created_ms, submitted_ms, sweeps_json, priority, folder, build_profile) \
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $10, $11, $12, $13, $14) \
          ON CONFLICT (name, series) DO UPDATE SET title = excluded.title, manifest_toml = excluded.manifest_toml, \
          claims_json = excluded.claims_json, policy_json = excluded.policy_json, \
          consolidate_frames = excluded.consolidate_frames, machine_class = excluded.machine_class, \
-         runs_hash = excluded.runs_hash, submitted_ms = excluded.submitted_ms, sweeps_json = excluded.sweeps_json \
-         RETURNING id",
+         runs_hash = excluded.runs_hash, submitted_ms = excluded.submitted_ms, sweeps_json = excluded.sweeps_json, \
+         priority = excluded.priority, folder = excluded.folder, build_profile = excluded.build_profile, \
+         state = 'active' RETURNING id",
     )
     .bind(&s.name)
     .bind(i64::from(s.series))
@@ -229,8 +236,12 @@ async fn put_study(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]
     .bind(&runs_hash)
     .bind(now_ms())
     .bind(&s.sweeps_json)
+    .bind(s.priority)
+    .bind(&s.folder)
+    .bind(s.cells.first().map_or("", |c| c.spec.protocol.build_profile.as_str()))
     .fetch_one(&mut **tx)
     .await?;
+    control::join_the_queue(tx, study_id).await?;
     if before.is_some_and(|(_, hash)| hash == runs_hash) {
         return Ok(study_id);
     }
@@ -268,7 +279,8 @@ async fn put_study(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]
 
 /// Failed and cancelled jobs of the study's failed measurements wait again, with a clean count of
 /// attempts. Trials already accepted stay, unless they are what disagreed: then all are taken anew.
-async fn retry_failed(tx: &mut Transaction<'_, Sqlite>, study_id: i64) -> sqlx::Result<()> {
+pub(super) async fn retry_failed(tx: &mut Transaction<'_, Sqlite>, study_id: i64) -> sqlx::Result<()> {
+    changes::tick(tx).await?;
     let failed = "SELECT m.measurement_id FROM measurements m JOIN study_runs r ON r.measurement_id = m.measurement_id \
                   WHERE r.study_id = $1 AND m.status = 'failed'";
     let disagreed = format!("{failed} AND m.reason LIKE 'counters differ%'");
@@ -299,8 +311,8 @@ async fn retry_failed(tx: &mut Transaction<'_, Sqlite>, study_id: i64) -> sqlx::
             "UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'judge' AND state IN ('failed', 'cancelled') AND target IN ({judged})"
         ),
         format!(
-            "UPDATE measurements SET status = 'pending', reason = NULL, stop_reason = NULL, finished_ms = NULL \
-                 WHERE measurement_id IN ({failed})"
+            "UPDATE measurements SET status = 'pending', reason = NULL, stop_reason = NULL, finished_ms = NULL, \
+                 changed = (SELECT now FROM clock) WHERE measurement_id IN ({failed})"
         ),
     ] {
         sqlx::query(sqlx::AssertSqlSafe(sql)).bind(study_id).execute(&mut **tx).await?;

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
-use tokio::process::{Child, Command};
+use tokio::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command};
 
 /// Of standard error, the end tells why.
 const TAIL_BYTES: usize = 2000;
@@ -89,9 +89,7 @@ impl Launcher {
         let input = serde_json::to_vec(request).expect("a request is plain data");
         let mut child = self.spawn(request.job)?;
         let mut group = Group(child.id());
-        let mut stdin = child.stdin.take().expect("piped");
-        let mut stdout = child.stdout.take().expect("piped");
-        let mut stderr = child.stderr.take().expect("piped");
+        let (mut stdin, mut stdout, mut stderr) = pipes(&mut child);
         let talk = async {
             let write = async move {
                 // A child that dies before it has read everything shows in its status.
@@ -116,9 +114,54 @@ impl Launcher {
         Ok(interpret(&out, &err, status, request.memory_limit_mib))
     }
 
+    /// Asks a verb of the program one thing, beside the measuring lane: JSON in, whatever
+    /// it writes out.
+    ///
+    /// # Errors
+    /// When it cannot be started or takes longer than `limit`.
+    pub async fn ask(&self, verb: &str, request: &impl Serialize, limit: Duration) -> Result<Answered> {
+        let input = serde_json::to_vec(request).expect("a request is plain data");
+        let mut child = self.beside(verb)?;
+        let mut group = Group(child.id());
+        let (mut stdin, mut stdout, mut stderr) = pipes(&mut child);
+        let talk = async {
+            let write = async move {
+                let _ = stdin.write_all(&input).await;
+                drop(stdin);
+            };
+            let read = async {
+                let mut out = Vec::new();
+                let _ = stdout.read_to_end(&mut out).await;
+                out
+            };
+            let ((), stdout, stderr) = tokio::join!(write, read, tail(&mut stderr));
+            Answered { stdout, stderr, success: child.wait().await.is_ok_and(|s| s.success()) }
+        };
+        let Ok(answered) = tokio::time::timeout(limit, talk).await else {
+            group.kill();
+            let _ = child.wait().await;
+            return Err(Error::new(format!("reading it took longer than {} s", limit.as_secs()))
+                .help("send a smaller scene, or several"));
+        };
+        group.0 = None;
+        Ok(answered)
+    }
+
+    /// A child of this machine's other cores, which talks by its standard streams.
+    ///
+    /// # Errors
+    /// When it cannot be started.
+    pub fn beside(&self, verb: &str) -> Result<Child> {
+        self.start(verb, Kind::Judge)
+    }
+
     fn spawn(&self, kind: Kind) -> Result<Child> {
+        self.start("exec", kind)
+    }
+
+    fn start(&self, verb: &str, kind: Kind) -> Result<Child> {
         let mut command = Command::new(&self.exe);
-        command.arg("exec").stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).kill_on_drop(true);
+        command.arg(verb).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).kill_on_drop(true);
         #[cfg(unix)]
         command.process_group(0);
         #[cfg(target_os = "linux")]
@@ -135,6 +178,27 @@ impl Launcher {
                 .help("was it moved or rebuilt while a study ran? start the study again: it goes on where it stopped")
         })
     }
+}
+
+/// What [`Launcher::ask`] brought.
+#[derive(Debug)]
+pub struct Answered {
+    pub stdout: Vec<u8>,
+    /// Its end.
+    pub stderr: String,
+    pub success: bool,
+}
+
+impl Answered {
+    /// Why there is no answer, from what it wrote beside.
+    pub fn why(&self) -> String {
+        let last = self.stderr.lines().rfind(|l| !l.trim().is_empty());
+        last.map_or_else(|| "its process ended without a word".to_string(), str::to_string)
+    }
+}
+
+fn pipes(child: &mut Child) -> (ChildStdin, ChildStdout, ChildStderr) {
+    (child.stdin.take().expect("piped"), child.stdout.take().expect("piped"), child.stderr.take().expect("piped"))
 }
 
 /// Kills a whole process group, unless told that its leader has been waited for.

@@ -2,33 +2,24 @@
 //!
 //! One worker owns the measuring lane and takes trials only; the others take
 //! judgements and stay off the lane's core. With a single core, one worker
-//! takes both in turn. Ending cleanly (Ctrl-C) kills the children and gives
-//! their leases back; being killed loses at most the trial in flight.
+//! takes both in turn. A crew works for one study (`work`, until nothing is left) or
+//! for every study of a database (`pool`, until it is told to end). Ending cleanly
+//! gives leases back; being killed loses at most the trial in flight.
 
 pub mod child;
+mod crew;
 pub mod lane;
+mod serving;
 
 use crate::error::{Error, Result};
-use crate::record::{Judgement, RepeatPolicy, TrialRecord};
 use crate::results::RunStatus;
-use crate::store::{self, Accepted, Kind, Lease, Left, Outcome, Settled, Store, queue};
-use child::{Ended, Launcher, Request};
-use lane::Lane;
+use crate::store::{Kind, Left, Pool, Store};
+use child::Launcher;
+use crew::{Crew, Scope};
 use serde::Serialize;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
-use tokio::sync::watch;
-
-/// A judgement computes ground truth at many samples a pixel, or waits for a
-/// cache to fill: its limit is so many times that of a trial.
-const JUDGE_TIME: f64 = 10.0;
-
-/// How long an idle worker rests before it looks again.
-const REST: Duration = Duration::from_millis(30);
-
-/// How often the jobs left are counted in the database.
-const RECOUNT: Duration = Duration::from_secs(2);
+use std::sync::Arc;
+use tokio::sync::{Notify, watch};
 
 /// What a crew of workers needs to know besides the store.
 #[derive(Debug, Clone)]
@@ -40,6 +31,16 @@ pub struct Options {
     pub auxiliary: usize,
 }
 
+/// What a crew is to do now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    Work,
+    /// End what is under way, take nothing new.
+    Drain,
+    /// Give back what is under way.
+    Stop,
+}
+
 /// What happens, for progress and for logs (one JSON object a line).
 #[derive(Debug, Clone, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
@@ -47,6 +48,9 @@ pub enum Event {
     /// Another process measures on this machine right now.
     LaneBusy,
     JobStarted {
+        /// Number of the worker, from 0: the one on the lane.
+        worker: usize,
+        study_id: i64,
         kind: Kind,
         measurement_id: String,
         run: String,
@@ -55,6 +59,8 @@ pub enum Event {
         take: u32,
     },
     JobEnded {
+        worker: usize,
+        study_id: i64,
         kind: Kind,
         measurement_id: String,
         run: String,
@@ -63,10 +69,18 @@ pub enum Event {
         outcome: &'static str,
         reason: Option<String>,
         wall_ms: f64,
-        /// Jobs of this study still to do.
+        /// Jobs of this study still to do; 0 where a pool works for many.
         left: Left,
     },
+    /// A worker of a pool met trouble that is not a run's (a full disk, a locked
+    /// database) and tries again after a while.
+    Trouble {
+        worker: usize,
+        message: String,
+        again_s: f64,
+    },
     RunEnded {
+        study_id: i64,
         measurement_id: String,
         run: String,
         status: RunStatus,
@@ -76,19 +90,7 @@ pub enum Event {
 
 pub type Listener = Arc<dyn Fn(Event) + Send + Sync>;
 
-/// A study being worked on by this process.
-struct Crew {
-    store: Store,
-    study_id: i64,
-    policy: RepeatPolicy,
-    options: Options,
-    tell: Listener,
-    stop: watch::Receiver<bool>,
-    left: Mutex<Left>,
-    counted: Mutex<Instant>,
-}
-
-/// Works until the study has no job left, or `stop` turns true. True if it was stopped.
+/// Works until the study has no job left, or `phase` says so. True if it was stopped.
 ///
 /// # Errors
 /// When the database fails (full, locked, damaged) or children cannot be
@@ -96,36 +98,20 @@ struct Crew {
 pub async fn work(
     store: &Store,
     study_id: i64,
-    policy: &RepeatPolicy,
     options: &Options,
     tell: Listener,
-    stop: watch::Receiver<bool>,
+    phase: watch::Receiver<Phase>,
 ) -> Result<bool> {
-    let crew = Arc::new(Crew {
-        store: store.clone(),
-        study_id,
-        policy: policy.clone(),
-        options: options.clone(),
-        tell,
-        stop,
-        left: Mutex::new(Left::default()),
-        counted: Mutex::new(Instant::now()),
-    });
+    let crew = Crew::new(store, Scope::Study(study_id), options, tell, phase, Arc::default());
+    let crew = Arc::new(crew);
     store.return_orphans().await?;
     // A process may have died between accepting a trial and drawing the conclusion.
-    crew.settle_all().await?;
-    *crew.left() = store.jobs_left(study_id).await?;
+    crew.settle_all(study_id).await?;
+    crew.count(study_id).await?;
     let mut tasks = tokio::task::JoinSet::new();
-    let single = options.launcher.lane_core.is_none();
-    let kinds: Vec<&'static [Kind]> = if single {
-        vec![&[Kind::Judge, Kind::Trial]]
-    } else {
-        let auxiliary = std::iter::repeat_n(&[Kind::Judge][..], options.auxiliary.max(1));
-        std::iter::once(&[Kind::Trial][..]).chain(auxiliary).collect()
-    };
-    for kinds in kinds {
+    for (worker, kinds) in shifts(options).into_iter().enumerate() {
         let crew = crew.clone();
-        tasks.spawn(async move { crew.labour(kinds).await });
+        tasks.spawn(async move { crew.labour(worker, kinds, study_id).await });
     }
     let mut first_error = None;
     while let Some(ended) = tasks.join_next().await {
@@ -142,231 +128,50 @@ pub async fn work(
     }
     match first_error {
         Some(e) => Err(e),
-        None => Ok(*crew.stop.borrow()),
+        None => Ok(crew.phase() != Phase::Work),
     }
 }
 
-impl Crew {
-    async fn labour(&self, kinds: &[Kind]) -> Result<()> {
-        let lane = Lane::new(&self.options.lane_file);
-        let mut looked = Instant::now();
-        while !self.stopped() {
-            let mut worked = false;
-            for kind in kinds {
-                worked |= match kind {
-                    Kind::Judge => self.one(Kind::Judge).await?,
-                    // Judgements alone are left: do not take the lane from others.
-                    Kind::Trial if !self.store.has_queued_trial(self.study_id).await? => false,
-                    Kind::Trial => {
-                        let _held = tokio::select! {
-                            held = lane.hold(|| (self.tell)(Event::LaneBusy)) => held?,
-                            () = self.stop_asked() => return Ok(()),
-                        };
-                        self.one(Kind::Trial).await?
-                    }
-                };
-            }
-            if worked {
-                continue;
-            }
-            // Nothing to take. Others may still work on what will become more jobs, or may have died.
-            if self.store.jobs_left(self.study_id).await? == Left::default() && self.settle_all().await? == 0 {
-                return Ok(());
-            }
-            if looked.elapsed() > Duration::from_secs(1) {
-                self.store.return_orphans().await?;
-                looked = Instant::now();
-            }
-            tokio::time::sleep(REST).await;
-        }
-        Ok(())
+/// Works for every active study of this machine's class until `phase` says so.
+/// `wake` rouses idle workers at once; otherwise they look from time to time, since
+/// other processes may submit, too. Trouble is told, and waited out.
+pub async fn pool(
+    store: &Store,
+    pool: Pool,
+    options: &Options,
+    tell: Listener,
+    phase: watch::Receiver<Phase>,
+    wake: Arc<Notify>,
+) {
+    let crew = Arc::new(Crew::new(store, Scope::Every(pool), options, tell, phase, wake));
+    let mut tasks = tokio::task::JoinSet::new();
+    for (worker, kinds) in shifts(options).into_iter().enumerate() {
+        let crew = crew.clone();
+        tasks.spawn(async move { crew.serve(worker, kinds).await });
     }
-
-    fn left(&self) -> MutexGuard<'_, Left> {
-        self.left.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Another process may work on the same study: from time to time its share is taken into account.
-    async fn count_again(&self) -> Result<()> {
+    let mender = crew.clone();
+    tasks.spawn(async move { mender.mend().await });
+    while let Some(ended) = tasks.join_next().await {
+        if let Err(e) = ended
+            && e.is_panic()
         {
-            let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
-            if counted.elapsed() < RECOUNT {
-                return Ok(());
-            }
-            *counted = Instant::now();
+            std::panic::resume_unwind(e.into_panic());
         }
-        let left = self.store.jobs_left(self.study_id).await?;
-        *self.left() = left;
-        Ok(())
-    }
-
-    fn stopped(&self) -> bool {
-        *self.stop.borrow()
-    }
-
-    async fn stop_asked(&self) {
-        let mut stop = self.stop.clone();
-        while !*stop.borrow_and_update() {
-            if stop.changed().await.is_err() {
-                // Nobody is left to ask.
-                std::future::pending::<()>().await;
-            }
-        }
-    }
-
-    /// Leases and does one job; false when there is none.
-    async fn one(&self, kind: Kind) -> Result<bool> {
-        let Some(lease) = self.store.lease(self.study_id, kind).await? else { return Ok(false) };
-        let run = store::label(&lease.spec);
-        (self.tell)(Event::JobStarted {
-            kind,
-            measurement_id: lease.job.target.clone(),
-            run: run.clone(),
-            repeat: lease.job.repeat,
-            take: lease.job.take,
-        });
-        let start = Instant::now();
-        let (outcome, reason) = match kind {
-            Kind::Trial => self.trial(&lease, start).await?,
-            Kind::Judge => self.judge(&lease, start).await?,
-        };
-        if matches!(outcome, "returned" | "crashed") {
-            // Not done: it waits again.
-        } else {
-            match kind {
-                Kind::Trial => self.left().trials -= 1,
-                Kind::Judge => self.left().judgements -= 1,
-            }
-        }
-        let concerned = match kind {
-            Kind::Trial => vec![lease.job.target.clone()],
-            Kind::Judge => self.store.unsettled(self.study_id, Some(&lease.job.target)).await?,
-        };
-        for id in concerned {
-            self.settle(&id, &run).await?;
-        }
-        self.count_again().await?;
-        (self.tell)(Event::JobEnded {
-            kind,
-            measurement_id: lease.job.target.clone(),
-            run,
-            repeat: lease.job.repeat,
-            outcome,
-            reason,
-            wall_ms: start.elapsed().as_secs_f64() * 1e3,
-            left: *self.left(),
-        });
-        Ok(true)
-    }
-
-    async fn trial(&self, lease: &Lease, start: Instant) -> Result<(&'static str, Option<String>)> {
-        let limit = Duration::from_secs_f64(self.policy.timeout_s);
-        let Some(ended) = self.child::<TrialRecord>(lease, limit, self.policy.memory_limit_mib).await? else {
-            return Ok(("returned", None));
-        };
-        let record = match ended {
-            Ended::Answered(record) => record,
-            other => return self.failed(lease, other).await,
-        };
-        let wall_ns = start.elapsed().as_nanos() as u64;
-        Ok((accepted(self.store.accept_trial(lease, &record, wall_ns).await?), None))
-    }
-
-    async fn judge(&self, lease: &Lease, start: Instant) -> Result<(&'static str, Option<String>)> {
-        let limit = Duration::from_secs_f64(self.policy.timeout_s * JUDGE_TIME);
-        // The memory limit is on the method under test, not on our ground truth.
-        let Some(ended) = self.child::<Judgement>(lease, limit, None).await? else {
-            return Ok(("returned", None));
-        };
-        let judgement = match ended {
-            Ended::Answered(judgement) => judgement,
-            other => return self.failed(lease, other).await,
-        };
-        let wall_ns = start.elapsed().as_nanos() as u64;
-        Ok((accepted(self.store.accept_judgement(lease, &judgement, wall_ns).await?), None))
-    }
-
-    async fn failed<T>(&self, lease: &Lease, ended: Ended<T>) -> Result<(&'static str, Option<String>)> {
-        let outcome = match ended {
-            Ended::Answered(_) => unreachable!("an answer is no failure"),
-            Ended::Refused(r) => Outcome::Refused(r),
-            Ended::TimedOut(r) => Outcome::TimedOut(r),
-            Ended::Crashed(r) => Outcome::Crashed(r),
-        };
-        let last = self.store.fail(lease, &outcome).await?;
-        let (Outcome::Refused(reason) | Outcome::TimedOut(reason) | Outcome::Crashed(reason)) = outcome;
-        Ok((if last { "failed" } else { "crashed" }, Some(reason)))
-    }
-
-    /// Runs the child while renewing its lease. `None`: the job was given back, or lost to another.
-    async fn child<T: for<'a> serde::Deserialize<'a>>(
-        &self,
-        lease: &Lease,
-        limit: Duration,
-        memory_limit_mib: Option<u64>,
-    ) -> Result<Option<Ended<T>>> {
-        let request =
-            Request { job: lease.job.kind, spec: &lease.spec, cache_dir: &self.options.cache_dir, memory_limit_mib };
-        let mut beat = tokio::time::interval(queue::LEASE / 3);
-        beat.tick().await;
-        let child = self.options.launcher.run::<T>(&request, limit);
-        tokio::pin!(child);
-        loop {
-            tokio::select! {
-                ended = &mut child => {
-                    return match ended {
-                        Ok(ended) => Ok(Some(ended)),
-                        Err(e) => {
-                            self.store.give_back(lease).await?;
-                            Err(e)
-                        }
-                    };
-                }
-                // Leaving drops the future, and that kills the child with all it started.
-                () = self.stop_asked() => {
-                    self.store.give_back(lease).await?;
-                    return Ok(None);
-                }
-                _ = beat.tick() => {
-                    if !self.store.renew(lease).await? {
-                        return Ok(None);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Settles what is open and nobody works on; the number of jobs that this added.
-    async fn settle_all(&self) -> Result<u32> {
-        let mut added = 0;
-        for id in self.store.loose_ends(self.study_id).await? {
-            let run = self.store.label_of(self.study_id, &id).await?;
-            added += self.settle(&id, &run).await?.trials_added;
-        }
-        Ok(added)
-    }
-
-    async fn settle(&self, measurement_id: &str, run: &str) -> Result<Settled> {
-        let settled = self.store.settle(self.study_id, measurement_id, &self.policy).await?;
-        self.left().trials += i64::from(settled.trials_added) - i64::from(settled.trials_cancelled);
-        if settled.status != RunStatus::Pending {
-            (self.tell)(Event::RunEnded {
-                measurement_id: measurement_id.to_string(),
-                run: run.to_string(),
-                status: settled.status,
-                reason: settled.reason.clone(),
-            });
-        }
-        Ok(settled)
     }
 }
 
-fn accepted(how: Accepted) -> &'static str {
-    match how {
-        Accepted::Yes => "accepted",
-        Accepted::Noisy => "noisy",
-        Accepted::Fenced => "fenced",
+/// How many workers a crew has.
+pub fn crew_size(options: &Options) -> usize {
+    shifts(options).len()
+}
+
+/// What each worker takes.
+fn shifts(options: &Options) -> Vec<&'static [Kind]> {
+    if options.launcher.lane_core.is_none() {
+        return vec![&[Kind::Judge, Kind::Trial]];
     }
+    let auxiliary = std::iter::repeat_n(&[Kind::Judge][..], options.auxiliary.max(1));
+    std::iter::once(&[Kind::Trial][..]).chain(auxiliary).collect()
 }
 
 /// How many workers beside the measuring one suit this machine.

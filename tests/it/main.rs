@@ -15,3 +15,4 @@ mod scenes;
 mod store;
 mod structures;
 mod tidy;
+mod viewing;

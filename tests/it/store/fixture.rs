@@ -75,6 +75,8 @@ pub(super) fn study(name: &str, specs: Vec<RunSpec>, repeats: u32) -> Submission
         cells: specs.into_iter().map(cell).collect(),
         excluded: vec![Excluded { cell: "bsp".into(), why: "too slow".into(), count: 3 }],
         retry_failed: false,
+        priority: 0,
+        folder: String::new(),
     }
 }
 
@@ -135,7 +137,7 @@ pub(super) async fn finish(store: &Store, study: i64, policy: &RepeatPolicy, mak
         let mut worked = false;
         while let Some(l) = store.lease(study, Kind::Judge).await.unwrap() {
             store.accept_judgement(&l, &judgement(None, "h"), 1).await.unwrap();
-            for id in store.unsettled(study, Some(&l.job.target)).await.unwrap() {
+            for (_, id) in store.waiting_for(study, &l.job.target).await.unwrap() {
                 store.settle(study, &id, policy).await.unwrap();
             }
             worked = true;

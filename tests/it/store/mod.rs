@@ -94,7 +94,7 @@ fn a_job_that_loses_its_worker_again_and_again_fails_with_a_reason() {
             assert_eq!(l.job.repeat, 0);
         }
         assert_eq!(times, 5);
-        let run = store.unsettled(id, None).await.unwrap().remove(0);
+        let run = store.loose_ends(id).await.unwrap().remove(0);
         let settled = store.settle(id, &run, &s.policy).await.unwrap();
         assert_eq!(settled.status, RunStatus::Failed);
         assert!(settled.reason.unwrap().contains("lost 5 times"));

@@ -8,7 +8,7 @@ use crate::record::{Accuracy, RepeatPolicy, RunSpec};
 use crate::results::RunStatus;
 use crate::stats;
 use crate::store::Store;
-use crate::store::read::KnownRun;
+use crate::store::known::KnownRun;
 use std::collections::HashMap;
 
 /// The state of every run of `matrix`, in its order.

@@ -1,0 +1,194 @@
+//! Studies that somebody looks at, kept in memory as columns and brought up to date with
+//! what changed since. What was computed of a run is stored, so that a restarted server
+//! reads it instead of computing it again.
+
+use super::problem::{Answer, Problem};
+use super::state::App;
+use crate::error::{Error, ErrorKind, Result};
+use crate::record::RunSpec;
+use crate::report::columns::{Columns, Line};
+use crate::report::facts::{Facts, revision};
+use crate::report::fields::Fields;
+use crate::store::facts::{Fact, RunLine};
+use crate::store::{Detail, Store};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::time::{Duration, Instant};
+
+/// Runs kept in memory over all studies; the least recently asked for go first.
+const ROWS: usize = 400_000;
+/// Runs whose frames are in memory at once while their metrics are computed.
+const CHUNK: usize = 256;
+/// Runs whose specs are in memory at once while a study is loaded.
+const LOAD: i64 = 4096;
+/// A study in work is brought up to date at most so often.
+const AGE: Duration = Duration::from_millis(200);
+
+/// A study in memory.
+#[derive(Debug, Default)]
+pub struct Board {
+    pub columns: Columns,
+    pub fields: Fields,
+    /// Submission and clock of changes that it shows: the version of every answer made of it.
+    stamp: String,
+    seen: i64,
+}
+
+impl Board {
+    pub fn version(&self) -> String {
+        format!("{}-{}", self.stamp, self.seen)
+    }
+}
+
+pub struct Slot {
+    board: RwLock<Board>,
+    /// One at a time brings it up to date.
+    refresh: tokio::sync::Mutex<Option<Instant>>,
+    used: Mutex<Instant>,
+}
+
+#[derive(Default)]
+pub struct Boards {
+    slots: Mutex<HashMap<i64, Arc<Slot>>>,
+}
+
+impl Boards {
+    fn slot(&self, study_id: i64) -> Arc<Slot> {
+        let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+        let slot = slots.entry(study_id).or_insert_with(|| {
+            Arc::new(Slot {
+                board: RwLock::default(),
+                refresh: tokio::sync::Mutex::new(None),
+                used: Mutex::new(Instant::now()),
+            })
+        });
+        *slot.used.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
+        slot.clone()
+    }
+
+    /// Drops what has not been asked for longest while too much is held.
+    fn trim(&self) {
+        let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+        let rows = |s: &Slot| s.board.read().map_or(0, |b| b.columns.len());
+        let mut total: usize = slots.values().map(|s| rows(s)).sum();
+        while total > ROWS && slots.len() > 1 {
+            let used = |s: &Slot| *s.used.lock().unwrap_or_else(PoisonError::into_inner);
+            let Some(oldest) = slots.iter().min_by_key(|(_, s)| used(s)).map(|(id, _)| *id) else { return };
+            total -= slots.remove(&oldest).map_or(0, |s| rows(&s));
+        }
+    }
+
+    pub fn forget(&self, study_id: i64) {
+        self.slots.lock().unwrap_or_else(PoisonError::into_inner).remove(&study_id);
+    }
+}
+
+/// Answers a question from a study's columns, off the threads that serve requests.
+pub async fn ask<T: Send + 'static>(
+    app: &Arc<App>,
+    study_id: i64,
+    question: impl FnOnce(&Board) -> Result<T> + Send + 'static,
+) -> Answer<T> {
+    let slot = app.boards.slot(study_id);
+    refresh(&app.store, study_id, &slot).await?;
+    app.boards.trim();
+    let task = tokio::task::spawn_blocking(move || {
+        let board = slot.board.read().unwrap_or_else(PoisonError::into_inner);
+        question(&board)
+    });
+    task.await.map_err(|e| Problem::internal(&e.to_string()))?.map_err(Problem::from)
+}
+
+async fn refresh(store: &Store, study_id: i64, slot: &Slot) -> Result<()> {
+    let mut done = slot.refresh.lock().await;
+    if done.is_some_and(|at| at.elapsed() < AGE) {
+        return Ok(());
+    }
+    let now = store.now().await?;
+    let stamp = store.stamp(study_id).await?;
+    let (known, seen) = {
+        let board = slot.board.read().unwrap_or_else(PoisonError::into_inner);
+        (board.stamp == stamp, board.seen)
+    };
+    if !known {
+        let board = load(store, study_id, stamp, now).await?;
+        *slot.board.write().unwrap_or_else(PoisonError::into_inner) = board;
+    } else if seen < now {
+        let lines = store.run_lines(study_id, seen, None).await?;
+        let facts = facts_of(store, study_id, &lines).await?;
+        let mut board = slot.board.write().unwrap_or_else(PoisonError::into_inner);
+        for (line, facts) in lines.iter().zip(&facts) {
+            if let Ok(row) = board.columns.ordinals.binary_search(&(line.ordinal as u32)) {
+                board.columns.set(row, facts);
+            }
+        }
+        board.seen = now;
+    }
+    *done = Some(Instant::now());
+    Ok(())
+}
+
+async fn load(store: &Store, study_id: i64, stamp: String, now: i64) -> Result<Board> {
+    let mut builder = Columns::builder();
+    let mut from = 0;
+    loop {
+        let lines = store.run_lines(study_id, 0, Some((from, from + LOAD))).await?;
+        let Some(last) = lines.last() else { break };
+        from = last.ordinal + 1;
+        let facts = facts_of(store, study_id, &lines).await?;
+        let specs: Vec<RunSpec> = lines
+            .par_iter()
+            .map(|l| {
+                serde_json::from_str(l.spec_json.as_deref().unwrap_or_default()).map_err(|e| {
+                    Error::new(format!("a run in the database cannot be read: {e}")).kind(ErrorKind::Unavailable)
+                })
+            })
+            .collect::<Result<_>>()?;
+        for ((line, spec), facts) in lines.iter().zip(&specs).zip(&facts) {
+            builder.push(&Line {
+                ordinal: line.ordinal as u32,
+                measurement_id: &line.measurement_id,
+                answer_id: &line.answer_id,
+                machine_class: &line.machine_class,
+                structure: &line.structure_label,
+                culling: &line.culling_label,
+                walk: &line.walk_label,
+                spec,
+                facts,
+            });
+        }
+    }
+    let columns = builder.finish();
+    Ok(Board { fields: columns.fields(), columns, stamp, seen: now })
+}
+
+/// What is known of each line: stored, or computed now and stored.
+async fn facts_of(store: &Store, study_id: i64, lines: &[RunLine]) -> Result<Vec<Facts>> {
+    let mut out: Vec<Option<Facts>> =
+        lines.par_iter().map(|l| l.fresh_facts(revision()).and_then(Facts::decode)).collect();
+    let stale: Vec<usize> = (0..lines.len()).filter(|i| out[*i].is_none()).collect();
+    for chunk in stale.chunks(CHUNK) {
+        let ids: Vec<String> = chunk.iter().map(|i| lines[*i].measurement_id.clone()).collect();
+        let runs = store.some_results(study_id, &ids, Detail::Frames).await?;
+        let found: HashMap<&str, Facts> = runs.par_iter().map(|r| (r.measurement_id.as_str(), Facts::of(r))).collect();
+        let mut fresh = Vec::new();
+        for i in chunk {
+            let line = &lines[*i];
+            let Some(facts) = found.get(line.measurement_id.as_str()) else { continue };
+            fresh.push(Fact {
+                measurement_id: line.measurement_id.clone(),
+                judgement_id: line.judgement_id.clone(),
+                changed: line.changed,
+                data: facts.encode(),
+            });
+            out[*i] = Some(facts.clone());
+        }
+        // A cache: who cannot write it reads on.
+        if let Err(e) = store.put_facts(revision(), &fresh).await {
+            tracing::warn!(error = %e, "computed metrics were not kept");
+        }
+    }
+    let gone = || Error::new("the study changed while it was read").kind(ErrorKind::Unavailable).help("ask again");
+    out.into_iter().map(|f| f.ok_or_else(gone)).collect()
+}

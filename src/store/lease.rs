@@ -1,0 +1,185 @@
+//! Taking jobs: the next one of a study, or of whichever study's turn it is.
+
+use super::queue::{Job, Kind, LEASE, Lease, reap};
+use super::{Store, now_ms, owner};
+use crate::error::Result;
+use sqlx::{Sqlite, SqliteConnection, Transaction};
+use std::time::Duration;
+
+/// While one worker computes a truth, another judgement that needs the same one
+/// would compute it twice: it waits until somebody has finished with that truth.
+const NOT_IN_THE_WAY: &str = "NOT (EXISTS \
+    (SELECT 1 FROM jobs b WHERE b.kind = 'judge' AND b.group_key = j.group_key AND b.state = 'leased') AND NOT EXISTS \
+    (SELECT 1 FROM jobs b WHERE b.kind = 'judge' AND b.group_key = j.group_key AND b.state = 'done'))";
+
+/// The next job of a study: of those that are its turn, or (`shared`) of those that
+/// another study has asked for as well and nobody has done yet.
+fn claim(kind: Kind, shared: bool) -> String {
+    let mine = match (kind, shared) {
+        (_, false) => "j.study_id = $1",
+        (Kind::Trial, true) => {
+            "EXISTS (SELECT 1 FROM study_runs r WHERE r.measurement_id = j.target AND r.study_id = $1)"
+        }
+        (Kind::Judge, true) => {
+            "EXISTS (SELECT 1 FROM study_runs r WHERE r.judgement_id = j.target AND r.study_id = $1)"
+        }
+    };
+    let (kind, free) = match kind {
+        Kind::Trial => ("trial", "1"),
+        Kind::Judge => ("judge", NOT_IN_THE_WAY),
+    };
+    format!(
+        "UPDATE jobs SET state = 'leased', owner = $2, epoch = epoch + 1, attempts = attempts + 1, \
+         lease_until_ms = $3 WHERE id = (SELECT j.id FROM jobs j WHERE j.kind = '{kind}' AND j.state = 'queued' AND \
+         {mine} AND {free} ORDER BY j.order_key LIMIT 1) RETURNING id, target, repeat_index, take, epoch"
+    )
+}
+
+/// Who may work for whom: trials count only on the class of machine, and from the
+/// kind of build, that their study was submitted for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pool {
+    pub machine_class: String,
+    pub build_profile: String,
+}
+
+impl Store {
+    /// Leases the next job of `kind` in `study_id`, if one waits.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn lease(&self, study_id: i64, kind: Kind) -> Result<Option<Lease>> {
+        self.lease_for(study_id, kind, LEASE).await
+    }
+
+    /// As [`Store::lease`] with another term.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn lease_for(&self, study_id: i64, kind: Kind, term: Duration) -> Result<Option<Lease>> {
+        let mut tx = self.begin("a lease").await?;
+        reap(&mut tx).await.map_err(|e| self.explain("a lease", &e))?;
+        let mut lease = self.claim(&mut tx, study_id, kind, false, term).await?;
+        if lease.is_none() {
+            lease = self.claim(&mut tx, study_id, kind, true, term).await?;
+        }
+        tx.commit().await.map_err(|e| self.explain("a lease", &e))?;
+        Ok(lease)
+    }
+
+    /// Leases the next job of `kind` of any active study: by priority, then who had
+    /// the least time so far.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn lease_any(&self, pool: &Pool, kind: Kind) -> Result<Option<Lease>> {
+        let explain = |e: sqlx::Error| self.explain("a lease", &e);
+        // Idle workers only read.
+        if self.candidates(&mut *self.readers.acquire().await.map_err(explain)?, pool, kind).await?.is_empty() {
+            return Ok(None);
+        }
+        let mut tx = self.begin("a lease").await?;
+        reap(&mut tx).await.map_err(explain)?;
+        let mut lease = None;
+        for study_id in self.candidates(&mut tx, pool, kind).await? {
+            lease = self.claim(&mut tx, study_id, kind, false, LEASE).await?;
+            if lease.is_some() {
+                break;
+            }
+        }
+        tx.commit().await.map_err(explain)?;
+        Ok(lease)
+    }
+
+    /// Whether a trial waits that the pool may take.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn has_trial_for(&self, pool: &Pool) -> Result<bool> {
+        let mut reader = self.readers.acquire().await.map_err(|e| self.explain("reading the queue", &e))?;
+        Ok(!self.candidates(&mut reader, pool, Kind::Trial).await?.is_empty())
+    }
+
+    async fn candidates(&self, connection: &mut SqliteConnection, pool: &Pool, kind: Kind) -> Result<Vec<i64>> {
+        let (used, name) = match kind {
+            Kind::Trial => ("lane_ms", "trial"),
+            Kind::Judge => ("beside_ms", "judge"),
+        };
+        let sql = format!(
+            "SELECT s.id FROM studies s WHERE s.state = 'active' AND s.machine_class = $1 AND s.build_profile IN ('', $2) \
+             AND NOT EXISTS (SELECT 1 FROM settings WHERE name = 'pool' AND value = 'paused') \
+             AND EXISTS (SELECT 1 FROM jobs j WHERE j.study_id = s.id AND j.kind = '{name}' AND j.state = 'queued') \
+             ORDER BY s.priority DESC, s.{used}, s.id"
+        );
+        sqlx::query_scalar(sqlx::AssertSqlSafe(sql))
+            .bind(&pool.machine_class)
+            .bind(&pool.build_profile)
+            .fetch_all(connection)
+            .await
+            .map_err(|e| self.explain("reading the queue", &e))
+    }
+
+    async fn claim(
+        &self,
+        tx: &mut Transaction<'_, Sqlite>,
+        study_id: i64,
+        kind: Kind,
+        shared: bool,
+        term: Duration,
+    ) -> Result<Option<Lease>> {
+        let explain = |e: sqlx::Error| self.explain("a lease", &e);
+        let (now, me) = (now_ms(), owner::this());
+        let row: Option<(i64, String, i64, i64, i64)> = sqlx::query_as(sqlx::AssertSqlSafe(claim(kind, shared)))
+            .bind(study_id)
+            .bind(me)
+            .bind(now + term.as_millis() as i64)
+            .fetch_optional(&mut **tx)
+            .await
+            .map_err(explain)?;
+        let Some((id, target, repeat, take, epoch)) = row else { return Ok(None) };
+        sqlx::query("INSERT INTO attempts (job_id, epoch, owner, started_ms) VALUES ($1, $2, $3, $4)")
+            .bind(id)
+            .bind(epoch)
+            .bind(me)
+            .bind(now)
+            .execute(&mut **tx)
+            .await
+            .map_err(explain)?;
+        let (spec, policy, structure, culling): (String, String, String, String) = sqlx::query_as(match kind {
+            Kind::Trial => {
+                "SELECT r.spec_json, s.policy_json, r.structure_label, r.culling_label FROM study_runs r JOIN studies s \
+                 ON s.id = r.study_id WHERE r.study_id = $1 AND r.measurement_id = $2 LIMIT 1"
+            }
+            Kind::Judge => {
+                "SELECT r.spec_json, s.policy_json, r.structure_label, r.culling_label FROM study_runs r JOIN studies s \
+                 ON s.id = r.study_id WHERE r.study_id = $1 AND r.judgement_id = $2 LIMIT 1"
+            }
+        })
+        .bind(study_id)
+        .bind(&target)
+        .fetch_one(&mut **tx)
+        .await
+        .map_err(explain)?;
+        let (spec, policy) = (self.parse(&spec, "a run")?, self.parse(&policy, "a policy")?);
+        let label = super::label(&spec, &structure, &culling);
+        let job = Job { id, kind, target, repeat: repeat as u32, take: take as u32 };
+        Ok(Some(Lease { job, epoch, spec, label, study_id, policy }))
+    }
+
+    /// Notes the time that a job took, so that studies get equal shares.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn charge(&self, lease: &Lease, time: Duration) -> Result<()> {
+        sqlx::query(match lease.job.kind {
+            Kind::Trial => "UPDATE studies SET lane_ms = lane_ms + $2 WHERE id = $1",
+            Kind::Judge => "UPDATE studies SET beside_ms = beside_ms + $2 WHERE id = $1",
+        })
+        .bind(lease.study_id)
+        .bind(time.as_millis().max(1) as i64)
+        .execute(&self.writer)
+        .await
+        .map_err(|e| self.explain("the queue", &e))?;
+        Ok(())
+    }
+}

@@ -1,0 +1,145 @@
+//! Nodes: the marks of a frame make up exactly what the walk submitted.
+
+use super::{Frame, run_spec};
+use cullmark::culling::{DrawList, TESTS, Tally, Test, WALKS, Walk, make_tests, make_walk};
+use cullmark::error::Result;
+use cullmark::hierarchy::{Hierarchy, NONE};
+use cullmark::math::{Camera, Pose, Projection, View};
+use cullmark::registry::{Spec, parse_sum};
+use cullmark::runner::Setup;
+use cullmark::scene::{Scene, load, walkthrough};
+use cullmark::structure::{self, Structure};
+use cullmark::viewing::RunView;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// A structure that was built before.
+struct Ready(Hierarchy);
+
+impl Structure for Ready {
+    fn build(&self, _: &Scene) -> Result<Hierarchy> {
+        Ok(self.0.clone())
+    }
+}
+
+fn view_of(
+    scene: &Scene,
+    poses: &[Pose],
+    camera: &Camera,
+    h: &Hierarchy,
+    culling: &str,
+    walk: Box<dyn Walk>,
+) -> RunView {
+    let (tests, _) = make_tests(&parse_sum(culling).unwrap()).unwrap();
+    let ready = Ready(h.clone());
+    let setup = Setup::from_parts(scene.clone(), poses.to_vec(), camera, &ready, tests, walk).unwrap();
+    RunView::of(setup, &run_spec("list", culling, "flat", 1), Path::new("/nonexistent"))
+}
+
+/// What the marks of nodes say was submitted before triangles are judged one by one.
+fn marked(h: &Hierarchy, codes: &[u8]) -> Vec<(u32, u32)> {
+    let mut ranges = Vec::new();
+    let mut codes = codes.iter();
+    for links in &h.links {
+        for lane in (0..8).filter(|l| links.live >> l & 1 == 1) {
+            let (first, own_end, end) = (links.first[lane], links.own_end[lane], links.end[lane]);
+            match codes.next().expect("a code for every node") {
+                1 => ranges.push((first, end)),
+                2 => {
+                    assert_ne!(links.child[lane], NONE, "a leaf does not go on");
+                    ranges.push((first, own_end));
+                }
+                0 | 16.. => {}
+                other => panic!("{other} is no mark of a node"),
+            }
+        }
+    }
+    assert!(codes.next().is_none());
+    ranges.sort_unstable();
+    let mut list = DrawList::default();
+    ranges.iter().for_each(|(first, end)| list.push(*first, *end));
+    list.ranges
+}
+
+/// The walk alone, with tests that nobody watches.
+fn walked(view: &View, h: &Hierarchy, tests: &mut [Box<dyn Test>], walk: &mut dyn Walk) -> Vec<(u32, u32)> {
+    let mut out = DrawList::default();
+    tests.iter_mut().for_each(|t| t.begin(view, h));
+    walk.run(view, h, tests, &mut out, &mut Tally::default());
+    out.ranges
+}
+
+fn sums() -> Vec<String> {
+    let alone = TESTS.iter().map(|e| e.name.to_string());
+    let behind = TESTS.iter().filter(|e| e.name != "frustum").map(|e| format!("frustum+{}", e.name));
+    let more = ["none", "frustum:last_plane=true", "frustum:node_test=box_plane", "normal_mask:rays=node+frustum"];
+    let three = "octant_mask+frustum:arithmetic=f64+normal_cone:form=tight";
+    alone.chain(behind).chain(more.map(String::from)).chain([three.to_string()]).collect()
+}
+
+#[test]
+fn marks_of_nodes_make_up_what_the_walk_submitted_and_jumping_changes_nothing() {
+    let spec = run_spec("list", "none", "flat", 5);
+    let scene = load::load(&spec.scene).unwrap();
+    let poses = walkthrough::load(&spec.path, &spec.scene, &scene).unwrap();
+    let ortho = Camera { projection: Projection::Orthographic { height_m: 6.0 }, far_m: Some(20.0), ..spec.camera };
+    let policies = ["L", "R", "S", "E"].map(|p| format!("octree:depth=4,policy={p}"));
+    let named = structure::ALL.iter().map(|e| e.name.to_string());
+    let mut marks = BTreeSet::new();
+    for name in named.chain(policies).chain(["octree:depth=0".to_string(), "bsp:min_leaf=100".to_string()]) {
+        let h = structure::make(&Spec::parse(&name).unwrap()).unwrap().0.build(&scene).unwrap();
+        for (culling, walk) in sums().iter().flat_map(|c| WALKS.iter().map(move |w| (c, w.name))) {
+            let make = || make_walk(&Spec::parse(walk).unwrap()).unwrap().0;
+            for camera in [spec.camera, ortho] {
+                let mut tests = make_tests(&parse_sum(culling).unwrap()).unwrap().0;
+                tests.iter_mut().for_each(|t| _ = t.prepare(&scene, &h));
+                let mut own = make();
+                let mut view = view_of(&scene, &poses, &camera, &h, culling, make());
+                let mut frames = Vec::new();
+                for (n, pose) in poses.iter().enumerate() {
+                    let frame = view.frame(n, false).unwrap();
+                    let read = Frame::read(&frame);
+                    let want = walked(&View::new(&camera, pose), &h, &mut tests, own.as_mut());
+                    assert_eq!(marked(&h, &read.nodes), want, "{name} × {culling} × {walk}, frame {n}");
+                    marks.extend(read.nodes);
+                    frames.push(frame);
+                }
+                for n in [3, 0, 0, 4, 1] {
+                    assert!(view.frame(n, false).unwrap() == frames[n], "{name} × {culling} × {walk}, back to {n}");
+                }
+            }
+        }
+    }
+    assert_eq!(marks.into_iter().collect::<Vec<_>>(), [0, 1, 2, 16, 17, 18], "every kind of mark occurred");
+}
+
+/// Draws one more entry every frame.
+#[derive(Default)]
+struct Growing(u32);
+
+impl Walk for Growing {
+    fn refuses(&self, _: &Hierarchy) -> Option<String> {
+        None
+    }
+
+    fn reset(&mut self) {
+        self.0 = 0;
+    }
+
+    fn run(&mut self, _: &View, _: &Hierarchy, _: &mut [Box<dyn Test>], out: &mut DrawList, _: &mut Tally) {
+        self.0 += 1;
+        out.push(0, self.0);
+    }
+}
+
+#[test]
+fn a_walk_with_a_memory_is_shown_as_in_a_pass() {
+    let spec = run_spec("list", "none", "flat", 6);
+    let scene = load::load(&spec.scene).unwrap();
+    let poses = walkthrough::load(&spec.path, &spec.scene, &scene).unwrap();
+    let h = structure::make(&Spec::new("list")).unwrap().0.build(&scene).unwrap();
+    let mut view = view_of(&scene, &poses, &spec.camera, &h, "none", Box::new(Growing::default()));
+    for n in [2, 3, 5, 5, 1, 0, 4] {
+        assert_eq!(Frame::read(&view.frame(n, false).unwrap()).submitted, n as u32 + 1);
+    }
+}
