@@ -71,3 +71,11 @@ CREATE TABLE uploads (
     uploaded_ms BIGINT NOT NULL
 );
 CREATE INDEX uploads_name ON uploads (name, uploaded_ms);
+
+-- What is asked often of studies of a hundred thousand runs, and was looked for row by row.
+-- Whose judgement it is.
+CREATE INDEX measurements_judgement ON measurements (judgement_id);
+-- Runs that lack a decision: few, or being worked on.
+CREATE INDEX measurements_pending ON measurements (measurement_id) WHERE status = 'pending';
+-- Where a study was measured.
+CREATE INDEX trials_environment ON trials (environment_id, measurement_id);

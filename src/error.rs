@@ -105,10 +105,14 @@ impl std::error::Error for Error {}
 /// The candidate closest to `word` by edit distance, if close enough to be a
 /// likely misspelling. Used for every "did you mean".
 pub fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let length = word.chars().count();
+    let allowed = move |c: &str| (c.chars().count().max(length) / 3).max(1);
     candidates
         .into_iter()
+        // What is so much longer or shorter is no misspelling, and a stranger's word may be very long.
+        .filter(|c| length <= 200 && c.chars().count().abs_diff(length) <= allowed(c))
         .map(|c| (edit_distance(word, c), c))
-        .filter(|(d, c)| *d <= (c.chars().count().max(word.chars().count()) / 3).max(1))
+        .filter(|(d, c)| *d <= allowed(c))
         .min()
         .map(|(_, c)| c)
 }

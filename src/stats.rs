@@ -68,7 +68,8 @@ pub fn median_ci(values: &[f64]) -> (f64, f64) {
         let one = v.first().copied().unwrap_or(f64::NAN);
         return (one, one);
     }
-    let mut weighted = if n % 2 == 1 { odd_medians(&v) } else { even_medians(&v) };
+    // Of very many values the middle two are as good as one.
+    let mut weighted = if n % 2 == 1 || n > PAIRS { order_statistics(&v) } else { even_medians(&v) };
     weighted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let at = |q: f64| {
         let mut sum = 0.0;
@@ -102,21 +103,25 @@ fn ln_factorials(n: usize) -> Vec<f64> {
     std::iter::once(0.0).chain(steps).collect()
 }
 
-/// Each value with the share of resamples whose median it is.
-fn odd_medians(v: &[f64]) -> Vec<(f64, f64)> {
+/// Up to so many values the middle two of an even number are looked at in pairs.
+const PAIRS: usize = 200;
+
+/// Each value with the share of resamples whose median it is (whose lower middle, of an
+/// even number).
+fn order_statistics(v: &[f64]) -> Vec<(f64, f64)> {
     let (n, ln) = (v.len(), ln_factorials(v.len()));
-    let cdf: Vec<f64> = (0..=n).map(|i| at_least(n / 2 + 1, i, n, &ln)).collect();
+    let cdf: Vec<f64> = (0..=n).map(|i| at_least(n.div_ceil(2), i, n, &ln)).collect();
     v.iter().zip(cdf.windows(2)).map(|(x, c)| (*x, c[1] - c[0])).collect()
 }
 
 /// Each mean of two values with the share of resamples whose middle two they are.
 fn even_medians(v: &[f64]) -> Vec<(f64, f64)> {
     let (n, k, ln) = (v.len(), v.len() / 2, ln_factorials(v.len()));
-    let middle = (ln[n] - 2.0 * ln[k]).exp();
+    let middle_ln = ln[n] - 2.0 * ln[k];
     // k draws among the first i values and the other k from the j-th on; i < j, both from 1.
     let apart = |i: usize, j: usize| {
-        let share = |m: usize| (m as f64 / n as f64).powi(k as i32);
-        middle * share(i) * share(n + 1 - j)
+        let share = |m: usize| k as f64 * (m as f64 / n as f64).ln();
+        if i == 0 || j > n { 0.0 } else { (middle_ln + share(i) + share(n + 1 - j)).exp() }
     };
     let mut out = Vec::with_capacity(n * (n + 1) / 2);
     for i in 1..=n {
@@ -228,12 +233,18 @@ mod tests {
             assert!(share(&|x| x < lo) <= 0.03 && share(&|x| x <= lo) >= 0.02, "{n}: {lo}");
             assert!(share(&|x| x > hi) <= 0.03 && share(&|x| x >= hi) >= 0.02, "{n}: {hi}");
         }
-        for weights in [odd_medians(&[1.0, 2.0, 3.0, 4.0, 5.0]), even_medians(&[1.0, 2.0, 3.0, 4.0])] {
+        for weights in [order_statistics(&[1.0, 2.0, 3.0, 4.0, 5.0]), even_medians(&[1.0, 2.0, 3.0, 4.0])] {
             assert!((weights.iter().map(|w| w.1).sum::<f64>() - 1.0).abs() < 1e-12);
         }
         // All 27 resamples of three: 7 have the smallest as median, 13 the middle one.
-        let three = odd_medians(&[1.0, 2.0, 3.0]);
+        let three = order_statistics(&[1.0, 2.0, 3.0]);
         assert!((three[0].1 - 7.0 / 27.0).abs() < 1e-12 && (three[1].1 - 13.0 / 27.0).abs() < 1e-12);
+        for n in [200, 201, 202, 1500, 5000] {
+            let values: Vec<f64> = (0..n).map(f64::from).collect();
+            let (lo, hi) = median_ci(&values);
+            let (middle, root) = (f64::from(n) / 2.0, f64::from(n).sqrt());
+            assert!(lo < middle && hi > middle && hi - lo < 3.0 * root && hi - lo > root, "{n}: {lo} {hi}");
+        }
         assert_eq!(median_ci(&[f64::INFINITY; 3]), (f64::INFINITY, f64::INFINITY));
         assert_eq!(median_ci(&[4.0]), (4.0, 4.0));
     }

@@ -172,10 +172,16 @@ pub struct SceneView {
 }
 
 impl SceneView {
+    /// A scene without a fingerprint is taken as it is now.
+    ///
     /// # Errors
     /// Those of [`load::load_cached`].
     pub fn open(spec: &SceneSpec, cache: &Path) -> Result<SceneView> {
-        Ok(SceneView { spec: spec.clone(), scene: load::load_cached(spec, cache)? })
+        let mut spec = spec.clone();
+        if spec.fingerprint.is_empty() {
+            spec = load::describe(&spec.name, spec.source, spec.winding, Some(spec.up), spec.scale, spec.weld)?;
+        }
+        Ok(SceneView { scene: load::load_cached(&spec, cache)?, spec })
     }
 
     /// Without frames, nodes and tests; the camera is the default one.

@@ -296,11 +296,21 @@ function parsed(text) {
   }
 }
 
+/** The body of an answer. It may break off after the headers, which is no other failure than no answer. */
+async function read(response, how) {
+  try {
+    return await response[how]();
+  } catch (error) {
+    throw error instanceof TypeError ? unreachable(error) : error;
+  }
+}
+
 export const api = {
-  json: async (path, options = {}) => (await request(path, { accept: "application/json", ...options })).json(),
-  text: async (path, options) => (await request(path, options)).text(),
-  binary: async (path, options) => (await request(path, options)).arrayBuffer(),
-  blob: async (path, options) => (await request(path, options)).blob(),
+  json: async (path, options = {}) =>
+    read(await request(path, { accept: "application/json", ...options }), "json"),
+  text: async (path, options) => read(await request(path, options), "text"),
+  binary: async (path, options) => read(await request(path, options), "arrayBuffer"),
+  blob: async (path, options) => read(await request(path, options), "blob"),
   post: (path, body, options) => send("POST", path, body, options),
   patch: (path, body, options) => send("PATCH", path, body, options),
   del: (path, options) => send("DELETE", path, undefined, options),

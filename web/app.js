@@ -89,7 +89,7 @@ async function route({ first = false } = {}) {
     console.error(error);
     set(
       root,
-      problem(error, () => route()),
+      problem(error, () => route(), { heading: "h1" }),
     );
   }
   // After a move the focus starts at the new content, whose title the tab tells; on
@@ -123,7 +123,12 @@ function followLinks(event) {
   if (!link || link.target || link.hasAttribute("download")) return;
   const to = new URL(link.href, location.href);
   if (to.origin !== location.origin || to.pathname.startsWith("/api/") || to.pathname === "/metrics") return;
-  if (to.hash && to.pathname === location.pathname && to.search === location.search) return;
+  if (to.hash && to.pathname === location.pathname && to.search === location.search) {
+    // Left to the browser, a step inside the page would count as a move and mount it anew.
+    event.preventDefault();
+    document.getElementById(to.hash.slice(1))?.focus();
+    return;
+  }
   event.preventDefault();
   navigate(to.pathname + to.search + to.hash);
 }

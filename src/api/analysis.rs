@@ -8,13 +8,13 @@ use super::input::{Path, Query};
 use super::problem::{Answer, Problem};
 use super::state::Shared;
 use crate::claim::Claim;
-use crate::report::fields::Fields;
 use crate::report::filter::Filter;
 use crate::report::frontier::{Standing, fronts};
 use crate::report::frontier_table::{X, Y, only};
 use crate::report::labels::Grid;
+use crate::report::select::mask;
 use crate::report::{claims, metrics};
-use crate::results::{RunResult, StudyResults};
+use crate::results::StudyResults;
 use crate::store::Detail;
 use axum::extract::{OriginalUri, State};
 use axum::http::{HeaderMap, StatusCode};
@@ -23,40 +23,52 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use utoipa::{IntoParams, ToSchema};
 
-/// Charts and fronts need every frame of every run: more runs than this are narrowed first.
+/// Charts and fronts need every frame of every run: more than this is narrowed first.
 const RUNS: usize = 5000;
+const SERIES_BYTES: u64 = 160 << 20;
 
 /// All results of a study that pass a filter, and the version of the answer.
 pub async fn results(app: &Shared, study: &str, filter: Option<&str>) -> Answer<(StudyResults, String)> {
     let id = app.store.study_id(study).await?;
     let overview = app.overview(id).await?;
-    let version = boards::ask(app, id, |b| Ok(b.version())).await?;
-    if overview.runs.total as usize > RUNS {
-        return Err(Problem::new(
-            StatusCode::UNPROCESSABLE_ENTITY,
-            format!("the study has {} runs; this answer is made of {RUNS} at most", overview.runs.total),
-        )
-        .help("`runs` and `matrix` have no such limit; `cullmark report` neither"));
+    let text = filter.map(str::trim).filter(|t| !t.is_empty()).map(str::to_string);
+    let chosen = boards::ask(app, id, move |b| {
+        let filter = text.map(|t| Filter::parse(&t, &b.fields)).transpose().map_err(|e| e.key("where"))?;
+        let passed = mask(&b.columns, filter.as_ref());
+        let ids: Vec<String> = (0..passed.len()).filter(|r| passed[*r]).map(|r| b.columns.id(r)).collect();
+        Ok((ids, b.version()))
+    });
+    let (ids, version) = chosen.await?;
+    let help = "narrow it with `where`; `runs` and `matrix` have no such limit, `cullmark report` neither";
+    if ids.len() > RUNS {
+        let detail = format!("{} runs; this answer is made of {RUNS} at most", ids.len());
+        return Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, detail).help(help));
     }
-    let mut results = app.store.results_with(&overview.reference, Detail::Frames).await?;
-    if let Some(text) = filter.map(str::trim).filter(|t| !t.is_empty()) {
-        let fields = Fields::of(&results);
-        let filter = Filter::parse(text, &fields).map_err(|e| e.key("where"))?;
-        results.runs.retain(|r| filter.matches(r, &fields));
+    let bytes = app.store.series_bytes(&ids).await?;
+    if bytes > SERIES_BYTES {
+        let detail = format!(
+            "the frames of {} runs are {} MiB; this answer is made of {} MiB at most",
+            ids.len(),
+            bytes >> 20,
+            SERIES_BYTES >> 20
+        );
+        return Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, detail).help(help));
     }
-    Ok((results, version))
+    Ok((app.store.results_of(&overview.reference, &ids, Detail::Frames).await?, version))
 }
 
 pub async fn compute<T: Send + 'static>(work: impl FnOnce() -> Answer<T> + Send + 'static) -> Answer<T> {
     tokio::task::spawn_blocking(work).await.map_err(|e| Problem::internal(&e.to_string()))?
 }
 
-/// Where runs stand in the matrix, by measurement.
-pub fn ordinals(results: &StudyResults) -> HashMap<&str, usize> {
-    results.runs.iter().enumerate().map(|(i, r)| (r.measurement_id.as_str(), i)).collect()
+/// Where runs of a study stand in the matrix, by measurement.
+pub async fn ordinals(app: &Shared, study: &str) -> Answer<HashMap<String, u32>> {
+    let id = app.store.study_id(study).await?;
+    boards::ask(app, id, |b| Ok((0..b.columns.len()).map(|r| (b.columns.id(r), b.columns.ordinals[r])).collect())).await
 }
 
 #[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct FrontWanted {
     /// Metric of the cost
@@ -73,8 +85,10 @@ pub struct FrontWanted {
 #[derive(Serialize, ToSchema)]
 pub struct Point {
     run: String,
-    ordinal: usize,
+    ordinal: u32,
     label: String,
+    structure: String,
+    culling: String,
     x: Spread,
     y: Spread,
     /// `front`, `within_noise` or `dominated`
@@ -106,7 +120,7 @@ pub struct Fronts {
 
 /// Who is on the front of two metrics
 #[utoipa::path(get, path = "/studies/{study}/front", tag = "analysis", params(("study" = String, Path, description = "name or name@series"), FrontWanted),
-    responses((status = 200, body = Fronts), (status = 304), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Fronts), (status = 304), Problem))]
 pub async fn front(
     State(app): State<Shared>,
     _: Reader,
@@ -117,20 +131,15 @@ pub async fn front(
 ) -> Answer<Response> {
     let x = metrics::get(q.x.as_deref().unwrap_or(X)).map_err(|e| e.key("x"))?;
     let y = metrics::get(q.y.as_deref().unwrap_or(Y)).map_err(|e| e.key("y"))?;
-    // The ordinal is that of the whole matrix: the filter is applied to points.
-    let (results, version) = results(&app, &study, None).await?;
+    let (results, version) = results(&app, &study, q.filter.as_deref()).await?;
     let tag = caching::tag(&version, &uri.to_string());
     if caching::fresh(&headers, &tag) {
         return Ok(caching::not_modified(&tag));
     }
+    let number = ordinals(&app, &study).await?;
     let answer = compute(move || {
-        let fields = Fields::of(&results);
-        let text = q.filter.as_deref().map(str::trim).filter(|t| !t.is_empty());
-        let filter = text.map(|t| Filter::parse(t, &fields)).transpose().map_err(|e| e.key("where"))?;
         let grid = Grid::of(&results);
-        let number = ordinals(&results);
-        let keep = |run: &RunResult| filter.as_ref().is_none_or(|f| f.matches(run, &fields));
-        let mut found = fronts(&grid, x, y, &keep);
+        let mut found = fronts(&grid, x, y, &|_| true);
         if let Some(scene) = &q.scene {
             found = only(found, scene).map_err(|e| e.key("scene"))?;
         }
@@ -143,6 +152,8 @@ pub async fn front(
                     run: p.run.measurement_id.clone(),
                     ordinal: number[p.run.measurement_id.as_str()],
                     label: grid.combinations[p.combination].clone(),
+                    structure: p.run.structure.clone(),
+                    culling: p.run.culling.clone(),
                     x: p.x.into(),
                     y: p.y.into(),
                     standing: match p.standing {
@@ -197,7 +208,7 @@ pub async fn claims_of(app: &Shared, study: &str) -> Answer<Vec<Claim>> {
 
 /// How the claims of a study fared
 #[utoipa::path(get, path = "/studies/{study}/claims", tag = "analysis", params(("study" = String, Path, description = "name or name@series")),
-    responses((status = 200, body = Claims), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Claims), Problem))]
 pub async fn claims_route(
     State(app): State<Shared>,
     _: Reader,

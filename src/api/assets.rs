@@ -14,6 +14,9 @@ struct Files;
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
     connect-src 'self'; font-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
+/// Addresses that the page routes itself: a study's name may have a dot.
+const VIEWS: &[&str] = &["studies", "submit", "compare", "scenes", "machine"];
+
 /// On every answer.
 pub async fn headers(request: axum::extract::Request, next: Next) -> Response {
     let mut response = next.run(request).await;
@@ -51,10 +54,11 @@ pub async fn asset(uri: Uri, asked: HeaderMap) -> Response {
             .help("routes: /api/v1/openapi.json")
             .into_response();
     }
+    let view = VIEWS.contains(&path.split('/').next().unwrap_or_default());
     let (name, file) = match Files::get(path) {
         Some(file) => (path, file),
         // What looks like a file and is none is missing; the rest the page routes itself.
-        None if path.rsplit('/').next().is_some_and(|last| last.contains('.') && !last.contains('@')) => {
+        None if !view && path.rsplit('/').next().is_some_and(|last| last.contains('.')) => {
             return Problem::missing(format!("there is no `{}`", uri.path())).into_response();
         }
         None => match Files::get("index.html") {

@@ -18,7 +18,8 @@ pub struct Submitter;
 pub struct Admin;
 
 async fn role(parts: &Parts, app: &Shared) -> Answer<Role> {
-    if !app.has_tokens().await? {
+    // Once there were tokens, removing the last one opens nothing.
+    if !app.wants_tokens().await? {
         return Ok(Role::Admin);
     }
     let header = parts.headers.get(header::AUTHORIZATION).and_then(|h| h.to_str().ok());
@@ -85,6 +86,12 @@ fn foreign(app: &Shared, method: &Method, headers: &HeaderMap) -> Option<Problem
             Problem::new(StatusCode::MISDIRECTED_REQUEST, format!("`{host}` is no name of this server"))
                 .help("it listens on a loopback address: use localhost, 127.0.0.1 or [::1]"),
         );
+    }
+    // What costs the machine work is not for pages of others to trigger, by pictures say.
+    if text(header::HeaderName::from_static("sec-fetch-site")) == Some("cross-site")
+        && text(header::HeaderName::from_static("sec-fetch-mode")) != Some("navigate")
+    {
+        return Some(Problem::new(StatusCode::FORBIDDEN, "a page of another origin may not use this server"));
     }
     let safe = matches!(*method, Method::GET | Method::HEAD | Method::OPTIONS);
     let origin = text(header::ORIGIN)?;

@@ -7,14 +7,14 @@ use super::state::App;
 use crate::error::{Error, ErrorKind, Result};
 use crate::record::RunSpec;
 use crate::report::columns::{Columns, Line};
-use crate::report::facts::{Facts, revision};
+use crate::report::facts::{self, Facts};
 use crate::report::fields::Fields;
 use crate::store::facts::{Fact, RunLine};
 use crate::store::{Detail, Store};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Runs kept in memory over all studies; the least recently asked for go first.
 const ROWS: usize = 400_000;
@@ -22,8 +22,6 @@ const ROWS: usize = 400_000;
 const CHUNK: usize = 256;
 /// Runs whose specs are in memory at once while a study is loaded.
 const LOAD: i64 = 4096;
-/// A study in work is brought up to date at most so often.
-const AGE: Duration = Duration::from_millis(200);
 
 /// A study in memory.
 #[derive(Debug, Default)]
@@ -33,18 +31,22 @@ pub struct Board {
     /// Submission and clock of changes that it shows: the version of every answer made of it.
     stamp: String,
     seen: i64,
+    /// When something of it changed last.
+    changed: i64,
+    /// Of the facts: they depend on the model of the renderer, too.
+    revision: String,
 }
 
 impl Board {
     pub fn version(&self) -> String {
-        format!("{}-{}", self.stamp, self.seen)
+        format!("{}-{}", self.stamp, self.changed)
     }
 }
 
 pub struct Slot {
     board: RwLock<Board>,
-    /// One at a time brings it up to date.
-    refresh: tokio::sync::Mutex<Option<Instant>>,
+    /// One at a time brings it up to date; by the clock of changes, when that was done last.
+    refresh: tokio::sync::Mutex<Option<i64>>,
     used: Mutex<Instant>,
 }
 
@@ -102,49 +104,62 @@ pub async fn ask<T: Send + 'static>(
 
 async fn refresh(store: &Store, study_id: i64, slot: &Slot) -> Result<()> {
     let mut done = slot.refresh.lock().await;
-    if done.is_some_and(|at| at.elapsed() < AGE) {
+    // Submitting, and every decision about a run, moves the clock.
+    let now = store.now().await?;
+    if *done == Some(now) {
         return Ok(());
     }
-    let now = store.now().await?;
     let stamp = store.stamp(study_id).await?;
-    let (known, seen) = {
+    let (known, seen, revision) = {
         let board = slot.board.read().unwrap_or_else(PoisonError::into_inner);
-        (board.stamp == stamp, board.seen)
+        (board.stamp == stamp, board.seen, board.revision.clone())
     };
+    // Questions may hold it for a while: the other threads go on meanwhile.
+    let write = || tokio::task::block_in_place(|| slot.board.write().unwrap_or_else(PoisonError::into_inner));
     if !known {
         let board = load(store, study_id, stamp, now).await?;
-        *slot.board.write().unwrap_or_else(PoisonError::into_inner) = board;
+        *write() = board;
     } else if seen < now {
         let lines = store.run_lines(study_id, seen, None).await?;
-        let facts = facts_of(store, study_id, &lines).await?;
-        let mut board = slot.board.write().unwrap_or_else(PoisonError::into_inner);
+        let facts = facts_of(store, study_id, &lines, &revision).await?;
+        let mut board = write();
         for (line, facts) in lines.iter().zip(&facts) {
             if let Ok(row) = board.columns.ordinals.binary_search(&(line.ordinal as u32)) {
                 board.columns.set(row, facts);
             }
         }
         board.seen = now;
+        if !lines.is_empty() {
+            board.changed = now;
+        }
     }
-    *done = Some(Instant::now());
+    *done = Some(now);
     Ok(())
 }
 
 async fn load(store: &Store, study_id: i64, stamp: String, now: i64) -> Result<Board> {
     let mut builder = Columns::builder();
-    let mut from = 0;
+    let (mut from, mut revision) = (0, String::new());
     loop {
         let lines = store.run_lines(study_id, 0, Some((from, from + LOAD))).await?;
         let Some(last) = lines.last() else { break };
         from = last.ordinal + 1;
-        let facts = facts_of(store, study_id, &lines).await?;
-        let specs: Vec<RunSpec> = lines
-            .par_iter()
-            .map(|l| {
-                serde_json::from_str(l.spec_json.as_deref().unwrap_or_default()).map_err(|e| {
-                    Error::new(format!("a run in the database cannot be read: {e}")).kind(ErrorKind::Unavailable)
+        // Much work at once: the other threads of the runtime take over what waits here.
+        let parse = || {
+            lines
+                .par_iter()
+                .map(|l| {
+                    serde_json::from_str(l.spec_json.as_deref().unwrap_or_default()).map_err(|e| {
+                        Error::new(format!("a run in the database cannot be read: {e}")).kind(ErrorKind::Unavailable)
+                    })
                 })
-            })
-            .collect::<Result<_>>()?;
+                .collect::<Result<Vec<RunSpec>>>()
+        };
+        let specs = tokio::task::block_in_place(parse)?;
+        if let Some(spec) = specs.first().filter(|_| revision.is_empty()) {
+            revision = revision_for(spec);
+        }
+        let facts = facts_of(store, study_id, &lines, &revision).await?;
         for ((line, spec), facts) in lines.iter().zip(&specs).zip(&facts) {
             builder.push(&Line {
                 ordinal: line.ordinal as u32,
@@ -160,18 +175,27 @@ async fn load(store: &Store, study_id: i64, stamp: String, now: i64) -> Result<B
         }
     }
     let columns = builder.finish();
-    Ok(Board { fields: columns.fields(), columns, stamp, seen: now })
+    Ok(Board { fields: columns.fields(), columns, stamp, seen: now, changed: now, revision })
+}
+
+/// A study has one model of the renderer; another with another makes other numbers of the
+/// same measurements.
+fn revision_for(spec: &RunSpec) -> String {
+    let model = serde_json::to_vec(&spec.model).expect("a model is plain data");
+    format!("{}-{}", facts::revision(), &blake3::hash(&model).to_hex()[..8])
 }
 
 /// What is known of each line: stored, or computed now and stored.
-async fn facts_of(store: &Store, study_id: i64, lines: &[RunLine]) -> Result<Vec<Facts>> {
+async fn facts_of(store: &Store, study_id: i64, lines: &[RunLine], revision: &str) -> Result<Vec<Facts>> {
     let mut out: Vec<Option<Facts>> =
-        lines.par_iter().map(|l| l.fresh_facts(revision()).and_then(Facts::decode)).collect();
+        lines.par_iter().map(|l| l.fresh_facts(revision).and_then(Facts::decode)).collect();
     let stale: Vec<usize> = (0..lines.len()).filter(|i| out[*i].is_none()).collect();
     for chunk in stale.chunks(CHUNK) {
         let ids: Vec<String> = chunk.iter().map(|i| lines[*i].measurement_id.clone()).collect();
         let runs = store.some_results(study_id, &ids, Detail::Frames).await?;
-        let found: HashMap<&str, Facts> = runs.par_iter().map(|r| (r.measurement_id.as_str(), Facts::of(r))).collect();
+        let found: HashMap<&str, Facts> = tokio::task::block_in_place(|| {
+            runs.par_iter().map(|r| (r.measurement_id.as_str(), Facts::of(r))).collect()
+        });
         let mut fresh = Vec::new();
         for i in chunk {
             let line = &lines[*i];
@@ -185,7 +209,7 @@ async fn facts_of(store: &Store, study_id: i64, lines: &[RunLine]) -> Result<Vec
             out[*i] = Some(facts.clone());
         }
         // A cache: who cannot write it reads on.
-        if let Err(e) = store.put_facts(revision(), &fresh).await {
+        if let Err(e) = store.put_facts(revision, &fresh).await {
             tracing::warn!(error = %e, "computed metrics were not kept");
         }
     }

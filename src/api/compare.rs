@@ -15,6 +15,7 @@ use std::collections::HashMap;
 use utoipa::{IntoParams, ToSchema};
 
 #[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct CompareWanted {
     /// name or name@series
@@ -26,7 +27,7 @@ pub struct CompareWanted {
 
 #[derive(Serialize, ToSchema)]
 pub struct Side {
-    ordinal: usize,
+    ordinal: u32,
     value: Option<f64>,
 }
 
@@ -59,7 +60,7 @@ pub struct Comparison {
 
 /// Set two studies side by side
 #[utoipa::path(get, path = "/compare", tag = "analysis", params(CompareWanted),
-    responses((status = 200, body = Comparison), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Comparison), Problem))]
 pub async fn compare_route(
     State(app): State<Shared>,
     _: Reader,
@@ -71,10 +72,11 @@ pub async fn compare_route(
         let (a, b) = (app.store.study_id(&q.first).await?, app.store.study_id(&q.second).await?);
         (app.overview(a).await?.reference, app.overview(b).await?.reference)
     };
+    let (of_first, of_second) = (ordinals(&app, &q.first).await?, ordinals(&app, &q.second).await?);
     let answer = compute(move || {
         let pairs = compare::compare(&first, &second, &metric).map_err(|e| e.key("metric"))?;
         let shown = metrics::known(if metric == PAIRED { "median_frame_us" } else { &metric });
-        let (of_first, of_second) = (ordinals(&first), ordinals(&second));
+
         let mut counts: HashMap<&'static str, usize> =
             ["lower", "higher", "same", "unknown", "none"].into_iter().map(|w| (w, 0)).collect();
         let mut lines = Vec::new();
@@ -88,7 +90,7 @@ pub async fn compare_route(
                 Change::None => "none",
             };
             *counts.entry(change).or_default() += 1;
-            let side = |r: Option<&RunResult>, of: &HashMap<&str, usize>| {
+            let side = |r: Option<&RunResult>, of: &HashMap<String, u32>| {
                 r.map(|r| Side { ordinal: of[r.measurement_id.as_str()], value: shown.value(r) })
             };
             lines.push(PairLine {

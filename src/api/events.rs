@@ -16,7 +16,7 @@ use serde::Serialize;
 use serde_json::json;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::sync::{Notify, broadcast};
 
 /// Messages that a slow watcher may be behind before it loses some; it then gets the latest state.
@@ -25,6 +25,8 @@ const BACKLOG: usize = 256;
 const JOIN: Duration = Duration::from_millis(150);
 /// Other processes may work on the study, too: so often the database is asked.
 const LOOK: Duration = Duration::from_secs(1);
+/// Either is at least so many times as long as counting takes: a large study must not keep us busy.
+const EASE: u32 = 5;
 /// A word through every proxy that would close a silent connection.
 const BEAT: Duration = Duration::from_secs(15);
 
@@ -85,6 +87,10 @@ impl Hub {
         receiver
     }
 
+    fn remove(&self, study_id: i64) {
+        self.channels.lock().unwrap_or_else(PoisonError::into_inner).remove(&study_id);
+    }
+
     /// Ends the publisher if nobody watches any more; false if somebody came meanwhile.
     fn close(&self, study_id: i64) -> bool {
         let mut channels = self.channels.lock().unwrap_or_else(PoisonError::into_inner);
@@ -141,15 +147,17 @@ async fn publish(
     ended: Arc<Mutex<Vec<Ended>>>,
 ) {
     let mut last = Bytes::new();
-    let mut was_finished = false;
+    // Those who come to a finished study are told so at once.
+    let mut was_finished = progress(&app, study_id).await.is_ok_and(|(_, finished)| finished);
     let mut phase = app.phase.clone();
+    let mut took = Duration::ZERO;
     loop {
         tokio::select! {
-            () = changed.notified() => tokio::time::sleep(JOIN).await,
-            () = tokio::time::sleep(LOOK) => {}
+            () = changed.notified() => tokio::time::sleep((took * EASE).clamp(JOIN, 2 * LOOK)).await,
+            () = tokio::time::sleep((took * EASE).clamp(LOOK, 2 * LOOK)) => {}
             () = stopping(&mut phase) => {
                 let _ = sender.send(message("shutdown", &json!({})));
-                app.hub.close(study_id);
+                app.hub.remove(study_id);
                 return;
             }
         }
@@ -160,7 +168,10 @@ async fn publish(
                                "status": run.status, "reason": run.reason });
             let _ = sender.send(message("run", &data));
         }
-        match progress(&app, study_id).await {
+        let start = Instant::now();
+        let state = progress(&app, study_id).await;
+        took = start.elapsed();
+        match state {
             Ok((now, finished)) => {
                 if now != last {
                     let _ = sender.send(now.clone());
@@ -173,7 +184,8 @@ async fn publish(
             }
             Err(problem) if problem.status == 404 => {
                 let _ = sender.send(message("deleted", &json!({})));
-                app.hub.close(study_id);
+                // Whoever still listens hears of the end; the number may be another study's soon.
+                app.hub.remove(study_id);
                 return;
             }
             // A locked database, say: the next look tells.
@@ -188,7 +200,7 @@ async fn publish(
 /// Watch a study
 #[utoipa::path(get, path = "/studies/{study}/events", tag = "studies", params(("study" = String, Path, description = "name or name@series")),
     responses((status = 200, description = "events `progress`, `run`, `end`", content_type = "text/event-stream", body = String),
-              (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+              Problem))]
 pub async fn events(State(app): State<Shared>, _: Reader, Path(study): Path<String>) -> Answer<Response> {
     let study_id = app.store.study_id(&study).await?;
     let receiver = app.hub.subscribe(&app, study_id);

@@ -3,17 +3,21 @@
 
 use super::problem::Problem;
 use super::state::Shared;
+use axum::body::{Body, BodyDataStream, HttpBody};
 use axum::extract::{ConnectInfo, Request, State};
-use axum::http::StatusCode;
+use axum::http::{StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use futures_util::{StreamExt, stream};
 use std::collections::HashMap;
 use std::net::{IpAddr, SocketAddr};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// A client may ask so many times at once before the rate counts.
 const BURST_S: f64 = 4.0;
+/// What a refused request still sends is read so long.
+const DRAIN: Duration = Duration::from_secs(20);
 /// Clients that are remembered; the full ones are forgotten first.
 const CLIENTS: usize = 4096;
 
@@ -74,6 +78,26 @@ pub async fn time(State(app): State<Shared>, request: Request, next: Next) -> Re
             .help("ask for less at once (a filter, a smaller page), or raise `serve --timeout-s`")
             .into_response(),
     }
+}
+
+/// Reads what a refused request still sends, for a while: a client that writes on would see
+/// its connection break instead of the answer.
+pub async fn drain(request: Request, next: Next) -> Response {
+    // One that waits for leave to send has sent nothing.
+    if request.body().is_end_stream() || request.headers().contains_key(header::EXPECT) {
+        return next.run(request).await;
+    }
+    let (parts, body) = request.into_parts();
+    let rest = Arc::new(Mutex::new(body.into_data_stream()));
+    let stream = |of: Arc<Mutex<BodyDataStream>>| {
+        stream::poll_fn(move |cx| of.lock().unwrap_or_else(PoisonError::into_inner).poll_next_unpin(cx))
+    };
+    let response = next.run(Request::from_parts(parts, Body::from_stream(stream(rest.clone())))).await;
+    if !response.status().is_success() {
+        let mut rest = stream(rest);
+        let _ = tokio::time::timeout(DRAIN, async { while let Some(Ok(_)) = rest.next().await {} }).await;
+    }
+    response
 }
 
 /// A panic is our bug: the log has it, the client gets a problem document.

@@ -28,6 +28,7 @@ use axum::extract::DefaultBodyLimit;
 use axum::routing::get;
 use axum::{Router, middleware};
 pub use state::{App, Config, Shared};
+use tower_http::CompressionLevel;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
@@ -123,9 +124,11 @@ pub fn router(app: Shared) -> Router {
         .route("/healthz", get(ops::healthz))
         .route("/metrics", get(ops::metrics))
         .fallback(assets::asset)
-        .layer(CompressionLayer::new().compress_when(packed))
+        // Level 6 of the usual takes longer than making the answer did.
+        .layer(CompressionLayer::new().quality(CompressionLevel::Fastest).compress_when(packed))
         .layer(middleware::from_fn_with_state(app.clone(), auth::guard))
         .layer(middleware::from_fn_with_state(app.clone(), ops::log))
+        .layer(middleware::from_fn(limits::drain))
         .layer(CatchPanicLayer::custom(limits::panicked))
         .layer(middleware::from_fn(assets::headers))
         .with_state(app)
@@ -145,8 +148,10 @@ pub async fn serve(app: Shared, listener: tokio::net::TcpListener) -> std::io::R
         loop {
             tokio::time::sleep(std::time::Duration::from_secs(10)).await;
             views.views.tidy();
+            let _ = tokio::task::spawn_blocking(crate::machine::give_back_memory).await;
         }
     });
+    uploads::sweep(&app.config.upload_dir);
     let service = router(app).into_make_service_with_connect_info::<std::net::SocketAddr>();
     let done = axum::serve(listener, service).with_graceful_shutdown(ended).await;
     tidy.abort();

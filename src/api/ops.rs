@@ -72,7 +72,10 @@ pub async fn log(State(app): State<Shared>, request: Request, next: Next) -> Res
     let (method, path) = (request.method().clone(), request.uri().path().to_string());
     let response = next.run(request).await;
     let (status, time) = (response.status().as_u16(), start.elapsed());
-    app.counts.request(&format!("{method} {route}"), status, time.as_secs_f64());
+    // Any word may stand for a method; those of the standard are counted by name.
+    let known = ["GET", "HEAD", "POST", "PATCH", "DELETE", "OPTIONS", "PUT"].contains(&method.as_str());
+    let counted = if known { method.as_str() } else { "OTHER" };
+    app.counts.request(&format!("{counted} {route}"), status, time.as_secs_f64());
     tracing::debug!(%method, path, status, ms = time.as_secs_f64() * 1e3, "request");
     response
 }

@@ -5,7 +5,9 @@ use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
-use utoipa::ToSchema;
+use std::collections::BTreeMap;
+use utoipa::openapi::{ContentBuilder, Ref, RefOr, ResponseBuilder};
+use utoipa::{IntoResponses, ToSchema};
 
 /// What an answer is when it is none.
 #[derive(Debug, Clone, Serialize, ToSchema)]
@@ -127,6 +129,22 @@ impl From<Error> for Problem {
             retry_after_s: (e.kind == ErrorKind::Unavailable).then_some(5),
             ..Problem::new(status, format!("{key}{}{snippet}", e.message))
         }
+    }
+}
+
+/// Every route may answer with one.
+impl IntoResponses for Problem {
+    fn responses() -> BTreeMap<String, RefOr<utoipa::openapi::Response>> {
+        let schema = Ref::from_schema_name(Problem::name());
+        let content = ContentBuilder::new().schema(Some(schema)).build();
+        let response = |about: &str| {
+            let built = ResponseBuilder::new().description(about).content("application/problem+json", content.clone());
+            RefOr::T(built.build())
+        };
+        BTreeMap::from([
+            ("4XX".to_string(), response("the request cannot be answered so")),
+            ("5XX".to_string(), response("the server cannot answer now")),
+        ])
     }
 }
 

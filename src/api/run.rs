@@ -52,7 +52,8 @@ pub struct Run {
     trials: Vec<TrialLine>,
     #[schema(value_type = Vec<Object>)]
     attempts: Vec<Attempt>,
-    #[schema(value_type = Object)]
+    /// None before the first trial
+    #[schema(value_type = Option<Object>)]
     environment: Value,
     #[schema(value_type = Vec<Object>)]
     judged_frames: Vec<Value>,
@@ -82,7 +83,7 @@ pub async fn result(app: &Shared, study_id: i64, measurement: &str, detail: Deta
 /// One run
 #[utoipa::path(get, path = "/studies/{study}/runs/{run}", tag = "results",
     params(("study" = String, Path, description = "name or name@series"), ("run" = String, Path, description = "ordinal or measurement_id")),
-    responses((status = 200, body = Run), (status = 304), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Run), Problem))]
 pub async fn run(
     State(app): State<Shared>,
     _: Reader,
@@ -92,9 +93,11 @@ pub async fn run(
     let found = result(&app, id, &measurement, Detail::Frames).await?;
     let overview = app.overview(id).await?;
     let (mut trials, attempts, environment) = app.store.run_history(id, &measurement).await?;
-    if matches!(found.status, RunStatus::Wrong | RunStatus::Failed) {
+    // Also those of a run that is not judged yet: it may turn out to be wrong.
+    if found.status != RunStatus::Done {
         for t in &mut trials {
             (t.total_cull_ms, t.build_ms, t.prepare_ms, t.load_ms) = (None, None, None, None);
+            t.peak_rss_mib = None;
         }
     }
     let series = app.store.frame_series(&measurement).await?;
@@ -145,6 +148,7 @@ pub async fn run(
 }
 
 #[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct SeriesWanted {
     /// Names joined with commas; all if absent
@@ -176,7 +180,7 @@ pub struct SeriesAnswer {
 #[utoipa::path(get, path = "/studies/{study}/runs/{run}/series", tag = "results",
     params(("study" = String, Path, description = "name or name@series"), ("run" = String, Path, description = "ordinal or measurement_id"), SeriesWanted),
     responses((status = 200, content((SeriesAnswer = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"))),
-              (status = 304), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+              (status = 304), Problem))]
 pub async fn series(
     State(app): State<Shared>,
     _: Reader,
@@ -187,11 +191,12 @@ pub async fn series(
 ) -> Answer<Response> {
     let (id, measurement, ordinal, version) = locate(&app, &study, &run).await?;
     let tag = caching::tag(&version, &uri.to_string());
-    if caching::fresh(&headers, &tag) {
+    // Times of a run that is wrong or failed, or not judged yet, are withheld here, too.
+    let trusted = result(&app, id, &measurement, Detail::Summary).await?.status == RunStatus::Done;
+    // Of an open run the first trial brings counted series, and no version tells.
+    if trusted && caching::fresh(&headers, &tag) {
         return Ok(caching::not_modified(&tag));
     }
-    // Times of a run that is wrong or failed are withheld here, too.
-    let trusted = result(&app, id, &measurement, Detail::Summary).await?.status == RunStatus::Done;
     let mut all = app.store.frame_series(&measurement).await?;
     all.retain(|s| trusted || s.unit != "ns");
     let names = input::list(q.names.as_deref());

@@ -8,7 +8,7 @@ use super::input::{self, Path, Query};
 use super::problem::{Answer, Problem};
 use super::state::Shared;
 use super::studies::page_limit;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::report::fields::Field;
 use crate::report::filter::Filter;
 use crate::report::metrics;
@@ -25,10 +25,13 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::{IntoParams, ToSchema};
 
+/// Columns of one answer.
+const COLUMNS: usize = 64;
 /// Runs a page unless the request says otherwise.
 const PAGE: usize = 100;
 
 #[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct Wanted {
     /// Filter, as of `cullmark query --where`
@@ -60,6 +63,9 @@ pub struct ColumnInfo {
     name: String,
     unit: String,
     about: String,
+    /// Whether its cells are numbers, and whether with an interval
+    numeric: bool,
+    interval: bool,
 }
 
 #[derive(Serialize, ToSchema)]
@@ -93,6 +99,13 @@ enum Found {
 fn columns_of(board: &Board, names: &[String]) -> Result<Vec<(String, Field)>> {
     let names: Vec<String> =
         if names.is_empty() { DEFAULT_COLUMNS.iter().map(|c| c.to_string()).collect() } else { names.to_vec() };
+    let mut seen = std::collections::HashSet::new();
+    let names: Vec<String> = names.into_iter().filter(|n| seen.insert(n.clone())).collect();
+    if names.len() > COLUMNS {
+        return Err(
+            Error::new(format!("{} columns are asked for, {COLUMNS} at most are answered", names.len())).key("columns")
+        );
+    }
     names.into_iter().map(|n| board.fields.get(&n).map(|f| (n, f))).collect::<Result<_>>().map_err(|e| e.key("columns"))
 }
 
@@ -104,7 +117,7 @@ fn filter_of(board: &Board, text: Option<&str>) -> Result<Option<Filter>> {
 /// Runs of a study
 #[utoipa::path(get, path = "/studies/{study}/runs", tag = "results", params(("study" = String, Path, description = "name or name@series"), Wanted),
     responses((status = 200, content((RunPage = "application/json"), (String = "text/csv"))), (status = 304),
-              (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+              Problem))]
 pub async fn runs(
     State(app): State<Shared>,
     _: Reader,
@@ -138,7 +151,7 @@ pub async fn runs(
         let next = found.next.map(|n| URL_SAFE_NO_PAD.encode(n.to_string()));
         let infos = columns.iter().map(|(name, field)| {
             let c = b.fields.column(name, field);
-            ColumnInfo { name: name.clone(), unit: c.unit, about: c.about }
+            ColumnInfo { name: name.clone(), unit: c.unit, about: c.about, numeric: c.numeric, interval: c.interval }
         });
         let items = found.rows.iter().map(|row| line(b, *row, &columns)).collect();
         Ok(Found::Page(tag, RunPage { columns: infos.collect(), items, total: found.total, next }))
@@ -173,11 +186,19 @@ fn line(board: &Board, row: usize, columns: &[(String, Field)]) -> RunLine {
 
 fn csv(board: &Board, columns: &[(String, Field)], rows: &[usize]) -> String {
     let mut table: Table = board.fields.table(columns);
-    table.rows = rows.iter().map(|row| columns.iter().map(|(_, f)| cell(&board.columns, *row, f)).collect()).collect();
-    table.csv()
+    let mut out = table.csv();
+    let heading = out.len();
+    // As cells a large study takes many times as much memory as its text.
+    for chunk in rows.chunks(1024) {
+        let cells = |row: &usize| columns.iter().map(|(_, f)| cell(&board.columns, *row, f)).collect();
+        table.rows = chunk.iter().map(cells).collect();
+        out += &table.csv()[heading..];
+    }
+    out
 }
 
 #[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct MatrixWanted {
     /// Name of a metric
@@ -212,7 +233,7 @@ pub struct Heat {
 
 /// One metric over the whole matrix
 #[utoipa::path(get, path = "/studies/{study}/matrix", tag = "results", params(("study" = String, Path, description = "name or name@series"), MatrixWanted),
-    responses((status = 200, body = Heat), (status = 304), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Heat), (status = 304), Problem))]
 pub async fn matrix(
     State(app): State<Shared>,
     _: Reader,

@@ -1,16 +1,19 @@
 //! What all requests share.
 
 use super::boards::Boards;
+use super::charts::Drawn;
 use super::events::Hub;
 use super::limits::Rates;
 use super::ops::Counts;
 use super::problem::Answer;
 use super::views::Views;
 use crate::error::Result;
+use crate::machine::fitness::Check;
 use crate::store::{Counted, Overview, Pool, Store};
 use crate::worker::child::Launcher;
 use crate::worker::{Event, Phase};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::sync::{Notify, watch};
@@ -45,6 +48,8 @@ pub struct App {
     pub boards: Boards,
     pub hub: Hub,
     pub views: Views,
+    pub drawn: Drawn,
+    pub fitness: tokio::sync::Mutex<Option<(Instant, Vec<Check>)>>,
     pub rates: Rates,
     pub counts: Counts,
     pub workers: Mutex<Vec<Worker>>,
@@ -53,6 +58,7 @@ pub struct App {
     pub phase: watch::Receiver<Phase>,
     counted: tokio::sync::Mutex<Counted>,
     tokens: Mutex<Option<(Instant, bool)>>,
+    guarded: AtomicBool,
 }
 
 /// What a worker of this server does now.
@@ -74,6 +80,8 @@ impl App {
             boards: Boards::default(),
             hub: Hub::default(),
             views: Views::new(config.launcher.clone(), config.cache_dir.clone(), config.memory_limit_mib),
+            drawn: Drawn::default(),
+            fitness: tokio::sync::Mutex::new(None),
             rates: Rates::new(config.rate),
             counts: Counts::default(),
             workers: Mutex::new(vec![Worker::default(); workers]),
@@ -81,9 +89,18 @@ impl App {
             phase,
             counted: tokio::sync::Mutex::default(),
             tokens: Mutex::new(None),
+            guarded: AtomicBool::new(false),
             store,
             config,
         }
+    }
+
+    /// Whether a token is needed: since there was one, also after the last is removed.
+    pub async fn wants_tokens(&self) -> Result<bool> {
+        if self.has_tokens().await? {
+            self.guarded.store(true, Ordering::Relaxed);
+        }
+        Ok(self.guarded.load(Ordering::Relaxed))
     }
 
     pub async fn has_tokens(&self) -> Result<bool> {
@@ -136,7 +153,7 @@ impl App {
                 self.hub.run_ended(*study_id, measurement_id, run, *status, reason.as_deref());
             }
             Event::Trouble { worker, message, again_s } => {
-                tracing::error!(worker, message, again_s, "a worker met trouble and tries again");
+                tracing::error!(worker, why = message, again_s, "a worker met trouble and tries again");
             }
             Event::LaneBusy => tracing::info!("waiting for the measuring lane: another process holds it"),
         }

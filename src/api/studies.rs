@@ -20,6 +20,7 @@ const PAGE: usize = 50;
 pub const PAGE_LIMIT: usize = 1000;
 
 #[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct Pages {
     /// At most so many, 1 to 1000
@@ -46,7 +47,7 @@ pub fn page_limit(asked: Option<usize>, usual: usize) -> Answer<usize> {
 
 /// List studies
 #[utoipa::path(get, path = "/studies", tag = "studies", params(Pages),
-    responses((status = 200, body = StudyPage), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = StudyPage), Problem))]
 pub async fn list(State(app): State<Shared>, _: Reader, Query(q): Query<Pages>) -> Answer<axum::Json<StudyPage>> {
     let limit = page_limit(q.limit, PAGE)?;
     // Where the page starts: after the study submitted at that time.
@@ -89,7 +90,7 @@ pub struct Study {
 
 /// One study
 #[utoipa::path(get, path = "/studies/{study}", tag = "studies", params(("study" = String, Path, description = "name or name@series")),
-    responses((status = 200, body = Study), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Study), Problem))]
 pub async fn one(State(app): State<Shared>, _: Reader, Path(study): Path<String>) -> Answer<axum::Json<Study>> {
     let id = app.store.study_id(&study).await?;
     let about = app.store.about(id).await?;
@@ -137,7 +138,7 @@ fn description(manifest: &str) -> String {
 
 /// The manifest of a study
 #[utoipa::path(get, path = "/studies/{study}/manifest", tag = "studies", params(("study" = String, Path, description = "name or name@series")),
-    responses((status = 200, description = "TOML", content_type = "application/toml", body = String), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, description = "TOML", content_type = "application/toml", body = String), Problem))]
 pub async fn manifest(State(app): State<Shared>, _: Reader, Path(study): Path<String>) -> Answer<Response> {
     let id = app.store.study_id(&study).await?;
     let text = app.store.about(id).await?.manifest_toml;
@@ -154,7 +155,7 @@ pub struct Change {
 
 /// Change the priority of a study
 #[utoipa::path(patch, path = "/studies/{study}", tag = "studies", request_body = Change, params(("study" = String, Path, description = "name or name@series")),
-    responses((status = 200, body = Summary), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Summary), Problem))]
 pub async fn change(
     State(app): State<Shared>,
     _: Submitter,
@@ -180,7 +181,7 @@ macro_rules! action {
     ($name:ident, $path:literal, $about:literal, $id:literal) => {
         #[doc = $about]
         #[utoipa::path(post, path = $path, tag = "studies", operation_id = $id, params(("study" = String, Path, description = "name or name@series")),
-            responses((status = 200, body = Summary), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+            responses((status = 200, body = Summary), Problem))]
         pub async fn $name(State(app): State<Shared>, _: Submitter, Path(study): Path<String>) -> Answer<axum::Json<Summary>> {
             app.store.$name(&study).await?;
             after(&app, &study).await
@@ -194,6 +195,7 @@ action!(cancel, "/studies/{study}/cancel", "Drop what is left to do of a study; 
 action!(retry, "/studies/{study}/retry", "Queue again what failed", "retry_study");
 
 #[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct Deletion {
     /// Also measurements that no other study has
@@ -203,7 +205,7 @@ pub struct Deletion {
 
 /// Delete a study
 #[utoipa::path(delete, path = "/studies/{study}", tag = "studies", params(("study" = String, Path, description = "name or name@series"), Deletion),
-    responses((status = 204), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 204), Problem))]
 pub async fn delete(
     State(app): State<Shared>,
     _: Admin,
@@ -220,7 +222,7 @@ pub async fn delete(
 
 /// All metrics
 #[utoipa::path(get, path = "/metrics", tag = "results",
-    responses((status = 200, body = Vec<MetricInfo>), (status = "4XX", body = Problem)))]
+    responses((status = 200, body = Vec<MetricInfo>), Problem))]
 pub async fn metrics(_: Reader) -> axum::Json<Vec<MetricInfo>> {
     axum::Json(METRICS.iter().map(MetricInfo::from).collect())
 }

@@ -51,6 +51,7 @@ pub struct Wanted {
 
 /// The same beside a body of TOML.
 #[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct Beside {
     /// `key=value` pairs joined with `;`, beside a body of TOML
@@ -78,7 +79,7 @@ pub struct Taken {
 #[utoipa::path(post, path = "/studies", tag = "studies", params(Beside),
     request_body(content((Wanted = "application/json"), (String = "application/toml"))),
     responses((status = 201, body = Taken), (status = 200, description = "`validate_only`: the plan", body = Object),
-              (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+              Problem))]
 pub async fn submit(
     State(app): State<Shared>,
     _: Submitter,
@@ -123,7 +124,7 @@ async fn take(app: &Shared, wanted: Wanted) -> Answer<Response> {
     };
     let reach = reach(app).await?;
     let (text, sets) = (wanted.manifest, wanted.set);
-    let manifest = off_thread(move || read(text, &sets, reach, PathBuf::from("manifest.toml"))).await??;
+    let manifest = read(app, text, sets, reach, PathBuf::from("manifest.toml")).await?;
     let study = manifest.study.name.clone();
     let series = series(word.as_deref(), &app.store, &study).await?;
     let (manifest, matrix) = expand(app, manifest, series).await?;
@@ -137,8 +138,9 @@ async fn take(app: &Shared, wanted: Wanted) -> Answer<Response> {
     Ok((StatusCode::CREATED, axum::Json(taken)).into_response())
 }
 
-fn read(text: String, sets: &[String], reach: Reach, path: PathBuf) -> Answer<Manifest> {
-    Manifest::parse_within(text, &path, sets, reach).map_err(Problem::manifest)
+async fn read(app: &App, text: String, sets: Vec<String>, reach: Reach, path: PathBuf) -> Answer<Manifest> {
+    let read = off_thread(move || Manifest::parse_within(text, &path, &sets, reach)).await?;
+    read.map_err(|errors| mistaken(app, errors))
 }
 
 async fn off_thread<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Answer<T> {
@@ -148,20 +150,19 @@ async fn off_thread<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static
 async fn expand(app: &App, manifest: Manifest, series: u32) -> Answer<(Manifest, Matrix)> {
     let limit = app.config.max_cells;
     let pin_core = app.config.launcher.lane_core;
-    off_thread(move || {
+    let cells = matrix::count(&manifest);
+    if cells > limit {
+        return Err(Problem::new(
+            StatusCode::UNPROCESSABLE_ENTITY,
+            format!("the matrix has {cells} cells, this server takes {limit}"),
+        )
+        .help("shorten lists and ranges, or ask whoever runs the server (`serve --max-cells`)"));
+    }
+    let expanded = off_thread(move || {
         let setting = matrix::Setting { pin_core, ..setting(series) };
-        let matrix = matrix::expand(&manifest, &setting).map_err(Problem::manifest)?;
-        let cells = (matrix.runs.len() + matrix.excluded_runs.len()) as u64;
-        if cells > limit {
-            return Err(Problem::new(
-                StatusCode::UNPROCESSABLE_ENTITY,
-                format!("the matrix has {cells} cells, this server takes {limit}"),
-            )
-            .help("shorten lists and ranges, or ask whoever runs the server (`serve --max-cells`)"));
-        }
-        Ok((manifest, matrix))
-    })
-    .await?
+        matrix::expand(&manifest, &setting).map(|matrix| (manifest, matrix))
+    });
+    expanded.await?.map_err(|errors| mistaken(app, errors))
 }
 
 /// Reads every file of the study once, in a child: no triangle ever enters this process.
@@ -184,7 +185,9 @@ async fn preflight(app: &App, runs: &[RunSpec]) -> Answer<Vec<String>> {
     let out = app.config.launcher.ask("preflight", &request, PREFLIGHT).await?;
     match serde_json::from_slice(&out.stdout) {
         Ok(Reply { ok: Some(notes), .. }) => Ok(notes),
-        Ok(Reply { errors: Some(errors), .. }) => Err(Problem::mistakes(errors.into_iter().map(nameless).collect())),
+        Ok(Reply { errors: Some(errors), .. }) => {
+            Err(Problem::mistakes(errors.into_iter().map(|m| nameless(app, m)).collect()))
+        }
         _ => Err(Problem::new(
             StatusCode::UNPROCESSABLE_ENTITY,
             format!("the files of the study could not be read: {}", out.why()),
@@ -194,9 +197,17 @@ async fn preflight(app: &App, runs: &[RunSpec]) -> Answer<Vec<String>> {
 }
 
 /// Where the server keeps its files is nobody's business.
-pub fn nameless(mut mistake: Mistake) -> Mistake {
+pub fn nameless(app: &App, mut mistake: Mistake) -> Mistake {
     mistake.file = mistake.file.and_then(|f| PathBuf::from(f).file_name().map(|n| n.to_string_lossy().into_owned()));
+    let config = &app.config;
+    for folder in config.folders.iter().chain([&config.upload_dir, &config.cache_dir]) {
+        mistake.message = mistake.message.replace(&format!("{}/", folder.display()), "");
+    }
     mistake
+}
+
+fn mistaken(app: &App, errors: Vec<crate::Error>) -> Problem {
+    Problem::mistakes(errors.into_iter().map(|e| nameless(app, e.into())).collect())
 }
 
 async fn queue(app: &Shared, manifest: &Manifest, matrix: &Matrix, wish: Wish, notes: Vec<String>) -> Answer<Taken> {
@@ -229,7 +240,7 @@ fn shortened(plan: &crate::matrix::plan::Plan) -> Value {
 
 /// Measure a study anew, as the next series
 #[utoipa::path(post, path = "/studies/{study}/rerun", tag = "studies", operation_id = "rerun_study", params(("study" = String, Path, description = "name or name@series")),
-    responses((status = 201, body = Summary), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 201, body = Summary), Problem))]
 pub async fn rerun(State(app): State<Shared>, _: Submitter, Path(study): Path<String>) -> Answer<Response> {
     let id = app.store.study_id(&study).await?;
     let about = app.store.about(id).await?;
@@ -237,7 +248,7 @@ pub async fn rerun(State(app): State<Shared>, _: Submitter, Path(study): Path<St
     let path = PathBuf::from(&about.folder).join("manifest.toml");
     let reach = reach(&app).await?;
     let text = about.manifest_toml;
-    let manifest = off_thread(move || read(text, &[], reach, path)).await??;
+    let manifest = read(&app, text, Vec::new(), reach, path).await?;
     let series = app.store.next_series(&before.name).await?;
     let (manifest, matrix) = expand(&app, manifest, series).await?;
     let notes = preflight(&app, &matrix.runs).await?;

@@ -78,13 +78,14 @@ pub async fn reach(app: &App) -> Answer<Reach> {
 
 /// Files that users sent
 #[utoipa::path(get, path = "/uploads", tag = "files", operation_id = "list_uploads",
-    responses((status = 200, body = Uploads), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Uploads), Problem))]
 pub async fn list(State(app): State<Shared>, _: Reader) -> Answer<axum::Json<Uploads>> {
     let items = app.store.uploads().await?.into_iter().map(Upload::from).collect();
     Ok(axum::Json(Uploads { items }))
 }
 
 #[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct Named {
     /// `scene` or `path`
@@ -118,7 +119,7 @@ fn checked_name(kind: &str, name: &str) -> Answer<()> {
 /// Send a scene or a path
 #[utoipa::path(post, path = "/uploads", tag = "files", operation_id = "upload", params(Named),
     request_body(content = Vec<u8>, content_type = "application/octet-stream"),
-    responses((status = 201, body = Upload), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 201, body = Upload), Problem))]
 pub async fn upload(
     State(app): State<Shared>,
     _: Submitter,
@@ -148,6 +149,15 @@ pub async fn upload(
     let stored = app.store.add_upload(&stored).await?;
     tracing::info!(kind, name = stored.name, id = stored.id, bytes, "upload kept");
     Ok((StatusCode::CREATED, axum::Json(Upload::from(stored))).into_response())
+}
+
+/// Removes what a killed server was still receiving.
+pub fn sweep(folder: &FilePath) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        if entry.file_name().to_string_lossy().starts_with("part-") {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// A file that is being received; gone when it is not kept.
@@ -198,6 +208,8 @@ impl Part {
         if bytes == 0 {
             return Err(Problem::bad("the upload is empty").help("send the file itself as the body"));
         }
+        // Without it the error of the last write would be nobody's.
+        file.flush().await.map_err(|e| disk(&e))?;
         file.sync_all().await.map_err(|e| disk(&e))?;
         Ok((hash.finalize().to_hex()[..32].to_string(), bytes))
     }
@@ -227,9 +239,12 @@ async fn examine(app: &App, kind: &str, file: &FilePath) -> Answer<Examined> {
     match serde_json::from_slice(&out.stdout) {
         Ok(Reply { ok: Some(found), .. }) => Ok(found),
         Ok(Reply { error: Some(mistake), .. }) => {
-            let mistake = nameless(mistake);
+            let mistake = nameless(app, mistake);
             let line = mistake.line.map_or_else(String::new, |l| format!("line {l}: "));
-            let problem = unreadable(format!("the {kind} cannot be read: {line}{}", mistake.message));
+            // The file in hand has no name yet.
+            let own = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let message = mistake.message.replace(&format!("{own}: "), "").replace(&own, "the file");
+            let problem = unreadable(format!("the {kind} cannot be read: {line}{message}"));
             Err(match mistake.help {
                 Some(help) => problem.help(help),
                 None => problem,
@@ -242,7 +257,7 @@ async fn examine(app: &App, kind: &str, file: &FilePath) -> Answer<Examined> {
 
 /// Delete an upload
 #[utoipa::path(delete, path = "/uploads/{id}", tag = "files", operation_id = "delete_upload", params(("id" = String, Path, description = "id of an upload")),
-    responses((status = 204), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 204), Problem))]
 pub async fn delete(State(app): State<Shared>, _: Admin, Path(id): Path<String>) -> Answer<StatusCode> {
     let upload = app.store.remove_upload(&id).await?;
     if let Err(e) = tokio::fs::remove_file(file_of(&app, &upload)).await {

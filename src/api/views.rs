@@ -23,6 +23,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
 use tokio::process::{Child, ChildStdin, ChildStdout};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use utoipa::IntoParams;
 
 /// Scenes open at once: each costs its memory.
@@ -31,16 +32,26 @@ const OPEN: usize = 3;
 const IDLE: Duration = Duration::from_secs(120);
 /// Loading and building may take so long, and so may one answer.
 const LIMIT: Duration = Duration::from_secs(300);
-/// No answer is longer: 100 million triangles would be.
-const BYTES: usize = 4 << 30;
+/// No answer is longer: 30 million triangles would be.
+const BYTES: usize = 1 << 30;
 
 /// A child that has a scene open.
 struct Session {
-    child: Option<(Child, ChildStdin, BufReader<ChildStdout>)>,
+    child: Option<Talk>,
 }
 
+/// Dropping it ends the child.
+struct Talk {
+    stdin: ChildStdin,
+    stdout: BufReader<ChildStdout>,
+    _child: Child,
+    _permit: OwnedSemaphorePermit,
+}
+
+type Held = tokio::sync::OwnedMutexGuard<Session>;
+
 struct Slot {
-    session: tokio::sync::Mutex<Session>,
+    session: Arc<tokio::sync::Mutex<Session>>,
     used: Mutex<Instant>,
 }
 
@@ -49,6 +60,8 @@ pub struct Views {
     cache_dir: PathBuf,
     memory_limit_mib: u64,
     open: Mutex<HashMap<String, Arc<Slot>>>,
+    /// One a child, however many ask.
+    permits: Arc<Semaphore>,
 }
 
 /// What is to be looked at.
@@ -71,7 +84,7 @@ struct ReplyError {
 
 impl Views {
     pub fn new(launcher: Launcher, cache_dir: PathBuf, memory_limit_mib: u64) -> Views {
-        Views { launcher, cache_dir, memory_limit_mib, open: Mutex::default() }
+        Views { launcher, cache_dir, memory_limit_mib, open: Mutex::default(), permits: Arc::new(Semaphore::new(OPEN)) }
     }
 
     fn slots(&self) -> std::sync::MutexGuard<'_, HashMap<String, Arc<Slot>>> {
@@ -98,7 +111,7 @@ impl Views {
         let slot = {
             let mut slots = self.slots();
             let make = || {
-                let session = tokio::sync::Mutex::new(Session { child: None });
+                let session = Arc::new(tokio::sync::Mutex::new(Session { child: None }));
                 Arc::new(Slot { session, used: Mutex::new(Instant::now()) })
             };
             slots.entry(key.to_string()).or_insert_with(make).clone()
@@ -109,15 +122,22 @@ impl Views {
     }
 
     /// One answer of the child that has `subject` open; starts it if there is none.
-    pub async fn ask(&self, key: &str, subject: Subject, request: &Value) -> Answer<Vec<u8>> {
-        let slot = self.slot(key);
-        let mut session = slot.session.lock().await;
+    pub async fn ask(app: &Shared, key: &str, subject: Subject, request: Value) -> Answer<Vec<u8>> {
+        // Who goes away while waiting asks nothing. Once asked, the answer is read to its end
+        // whoever is gone: what is left of it would be taken for the next one's.
+        let session = app.views.slot(key).session.clone().lock_owned().await;
+        let app = app.clone();
+        let whole = tokio::spawn(async move { app.views.exchanged(session, subject, &request).await });
+        whole.await.map_err(|e| Problem::internal(&format!("the scene cannot be shown: {e}")))?
+    }
+
+    async fn exchanged(&self, mut session: Held, subject: Subject, request: &Value) -> Answer<Vec<u8>> {
         let work = async {
             if session.child.is_none() {
                 session.child = Some(self.start(subject).await?);
             }
-            let (_, stdin, stdout) = session.child.as_mut().expect("just started");
-            exchange(stdin, stdout, request).await
+            let child = session.child.as_mut().expect("just started");
+            exchange(&mut child.stdin, &mut child.stdout, request).await
         };
         let answer = tokio::time::timeout(LIMIT, work).await;
         let answer = answer.unwrap_or_else(|_| Err(Broken::Died("it took too long".into())));
@@ -133,7 +153,30 @@ impl Views {
         }
     }
 
-    async fn start(&self, subject: Subject) -> Result<(Child, ChildStdin, BufReader<ChildStdout>), Broken> {
+    /// Room for one more: whoever has been idle longest goes.
+    async fn permit(&self) -> Result<OwnedSemaphorePermit, Broken> {
+        if let Ok(permit) = self.permits.clone().try_acquire_owned() {
+            return Ok(permit);
+        }
+        {
+            let slots = self.slots();
+            let used = |s: &Slot| *s.used.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut by_age: Vec<&Arc<Slot>> = slots.values().collect();
+            by_age.sort_by_key(|s| used(s));
+            for slot in by_age {
+                if let Ok(mut session) = slot.session.try_lock()
+                    && session.child.take().is_some()
+                {
+                    break;
+                }
+            }
+        }
+        let permit = self.permits.clone().acquire_owned().await;
+        permit.map_err(|_| Broken::Died("the server is ending".into()))
+    }
+
+    async fn start(&self, subject: Subject) -> Result<Talk, Broken> {
+        let permit = self.permit().await?;
         let mut child = self.launcher.beside("view").map_err(|e| Broken::Refused(e.into()))?;
         let mut stdin = child.stdin.take().expect("piped");
         let mut stdout = BufReader::new(child.stdout.take().expect("piped"));
@@ -146,7 +189,7 @@ impl Views {
         };
         let request = json!({ "spec": spec, "scene": scene, "cache_dir": self.cache_dir, "memory_limit_mib": self.memory_limit_mib });
         exchange(&mut stdin, &mut stdout, &request).await?;
-        Ok((child, stdin, stdout))
+        Ok(Talk { _child: child, stdin, stdout, _permit: permit })
     }
 }
 
@@ -214,7 +257,8 @@ fn scene_of(app: &App, upload: &crate::store::uploads::Upload) -> SceneSpec {
         scale: 1.0,
         weld: false,
         offset_m: [0.0; 3],
-        fingerprint: format!("upload-{}", upload.id),
+        // Its content is its name already; whoever opens it takes the fingerprint.
+        fingerprint: String::new(),
     }
 }
 
@@ -224,15 +268,16 @@ async fn respond(app: &Shared, key: &str, subject: Subject, request: Value, head
     if caching::fresh(headers, &tag) {
         return Ok(caching::not_modified(&tag));
     }
-    let bytes = app.views.ask(key, subject, &request).await?;
-    let kind = if request["ask"] == "about" { "application/json" } else { "application/octet-stream" };
+    let about = request["ask"] == "about";
+    let bytes = Views::ask(app, key, subject, request).await?;
+    let kind = if about { "application/json" } else { "application/octet-stream" };
     Ok(caching::tagged(([(header::CONTENT_TYPE, kind)], bytes).into_response(), &tag))
 }
 
 /// What can be looked at in a run
 #[utoipa::path(get, path = "/studies/{study}/runs/{run}/view", tag = "frames",
     params(("study" = String, Path, description = "name or name@series"), ("run" = String, Path, description = "ordinal or measurement_id")),
-    responses((status = 200, body = Object), (status = 304), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Object), (status = 304), Problem))]
 pub async fn about(
     State(app): State<Shared>,
     _: Reader,
@@ -245,7 +290,7 @@ pub async fn about(
 /// The scene's triangles (CMSH)
 #[utoipa::path(get, path = "/studies/{study}/runs/{run}/view/mesh", tag = "frames",
     params(("study" = String, Path, description = "name or name@series"), ("run" = String, Path, description = "ordinal or measurement_id")),
-    responses((status = 200, body = Vec<u8>, content_type = "application/octet-stream"), (status = 304), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Vec<u8>, content_type = "application/octet-stream"), (status = 304), Problem))]
 pub async fn mesh(
     State(app): State<Shared>,
     _: Reader,
@@ -258,7 +303,7 @@ pub async fn mesh(
 /// The structure's nodes (CMND)
 #[utoipa::path(get, path = "/studies/{study}/runs/{run}/view/nodes", tag = "frames",
     params(("study" = String, Path, description = "name or name@series"), ("run" = String, Path, description = "ordinal or measurement_id")),
-    responses((status = 200, body = Vec<u8>, content_type = "application/octet-stream"), (status = 304), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Vec<u8>, content_type = "application/octet-stream"), (status = 304), Problem))]
 pub async fn nodes(
     State(app): State<Shared>,
     _: Reader,
@@ -269,6 +314,7 @@ pub async fn nodes(
 }
 
 #[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct FrameWanted {
     /// Also what is visible: costs an item buffer
@@ -279,7 +325,7 @@ pub struct FrameWanted {
 /// What a frame submitted, triangle by triangle (CMFR)
 #[utoipa::path(get, path = "/studies/{study}/runs/{run}/view/frames/{frame}", tag = "frames",
     params(("study" = String, Path, description = "name or name@series"), ("run" = String, Path, description = "ordinal or measurement_id"), ("frame" = u32, Path, description = "from 0"), FrameWanted),
-    responses((status = 200, body = Vec<u8>, content_type = "application/octet-stream"), (status = 304), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Vec<u8>, content_type = "application/octet-stream"), (status = 304), Problem))]
 pub async fn frame(
     State(app): State<Shared>,
     _: Reader,
@@ -292,7 +338,7 @@ pub async fn frame(
 
 /// An uploaded scene to look at
 #[utoipa::path(get, path = "/uploads/{id}/view", tag = "frames", operation_id = "view_upload", params(("id" = String, Path, description = "id of an upload")),
-    responses((status = 200, body = Object), (status = 304), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Object), (status = 304), Problem))]
 pub async fn upload_about(
     State(app): State<Shared>,
     _: Reader,
@@ -304,7 +350,7 @@ pub async fn upload_about(
 
 /// Its triangles (CMSH)
 #[utoipa::path(get, path = "/uploads/{id}/view/mesh", tag = "frames", operation_id = "view_upload_mesh", params(("id" = String, Path, description = "id of an upload")),
-    responses((status = 200, body = Vec<u8>, content_type = "application/octet-stream"), (status = 304), (status = "4XX", body = Problem), (status = "5XX", body = Problem)))]
+    responses((status = 200, body = Vec<u8>, content_type = "application/octet-stream"), (status = 304), Problem))]
 pub async fn upload_mesh(
     State(app): State<Shared>,
     _: Reader,

@@ -2,6 +2,7 @@
 
 use crate::machine::{self, fitness};
 use crate::store::{DEFAULT_DB, Store, block_on};
+use crate::worker::lane::{self, Lane};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -28,7 +29,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         None
     };
     let existing = args.db.ancestors().skip(1).find(|f| f.is_dir()).unwrap_or(Path::new("."));
-    let checks = fitness::checks(existing, machine::measuring_core(), noise);
+    // Held meanwhile: the probe must disturb no trial, and no trial the probe.
+    let held = Lane::new(&lane::default_path()).try_hold()?;
+    let checks = fitness::checks(existing, machine::measuring_core(), noise, held.is_some());
+    drop(held);
     let fit = fitness::fit(&checks);
     if args.json {
         let list: Vec<_> = checks

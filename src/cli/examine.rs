@@ -78,7 +78,9 @@ fn stands_alone(file: &Path) -> Result<()> {
             .in_file(file)
             .help("export it as .glb, which holds everything in one file"));
     }
-    let outside = |library: &&PathBuf| library.parent() != file.parent();
+    // A library beside it would be another's upload, or none: whatever is named is refused
+    // unless it is a plain name, and that is not there.
+    let outside = |library: &&PathBuf| library.parent() != file.parent() || library.exists();
     if let Some(library) = mtl::libraries(file, &bytes).iter().find(outside) {
         return Err(Error::new(format!("the material library {} is in another folder", library.display()))
             .in_file(file)

@@ -1,16 +1,18 @@
 //! What the hidden verbs share that a service drives: JSON in on standard input,
 //! JSON out on standard output, errors by name.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::process::ExitCode;
 
-/// Message with its place, and what to do: for one sentence to a user.
+/// Message with its place, and what to do: for one sentence to a user. A server passes it
+/// on, and in which folder it keeps its files is nobody's business.
 pub fn told(e: &Error) -> Value {
-    let message = Error { help: None, ..e.clone() }.to_string();
-    json!({ "message": message, "help": e.help })
+    let file = e.file.as_ref().map(|f| f.file_name().map_or_else(|| f.clone(), Into::into));
+    let message = Error { help: None, file, ..e.clone() }.to_string();
+    json!({ "message": message, "help": e.help, "unavailable": e.kind == ErrorKind::Unavailable })
 }
 
 /// Every part by itself: for an editor that marks the place.

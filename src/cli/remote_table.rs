@@ -8,12 +8,7 @@ pub fn of(page: &Value) -> Table {
     let word = |c: &Value, name: &str| c[name].as_str().unwrap_or_default().to_string();
     let one = |c: &Value| {
         let name = word(c, "name");
-        let numeric = page["items"].as_array().into_iter().flatten().any(|run| {
-            let cell = &run["cells"][&name];
-            cell.is_number() || cell.is_object()
-        });
-        let interval = page["items"].as_array().into_iter().flatten().any(|run| run["cells"][&name].is_object());
-        match (numeric, interval) {
+        match (c["numeric"] == true, c["interval"] == true) {
             (_, true) => column(&name, &word(c, "unit"), &word(c, "about")).with_interval(),
             (true, _) => column(&name, &word(c, "unit"), &word(c, "about")),
             _ => Column::text(&name),

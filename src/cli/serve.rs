@@ -121,7 +121,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let pool = pool_here();
     launcher.leave_the_lane();
     start_log(args.log, args.verbose);
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(4).enable_all().build()?;
     let code = runtime.block_on(serve(args, launcher, pool));
     runtime.shutdown_timeout(Duration::from_secs(2));
     code
@@ -160,11 +160,7 @@ async fn serve(args: Args, launcher: Launcher, pool: Pool) -> anyhow::Result<Exi
         pool: pool.clone(),
         launcher,
     };
-    let listener = tokio::net::TcpListener::bind(args.listen).await.map_err(|e| {
-        Error::new(format!("cannot listen on {}: {e}", args.listen))
-            .key("--listen")
-            .help("choose another port (0 takes a free one), or end what uses this one")
-    })?;
+    let listener = listen(args.listen).await?;
     let (phase, phases) = watch::channel(Phase::Work);
     let wake = Arc::new(Notify::new());
     let workers = if args.no_workers { 0 } else { worker::crew_size(&options) };
@@ -192,10 +188,41 @@ async fn serve(args: Args, launcher: Launcher, pool: Pool) -> anyhow::Result<Exi
     Ok(ExitCode::SUCCESS)
 }
 
+/// A server that was killed while it forked a child keeps its socket until that child is
+/// scheduled and dies, too: whoever starts the next one at once need not care.
+async fn listen(address: SocketAddr) -> crate::Result<tokio::net::TcpListener> {
+    let mut tries = 0;
+    loop {
+        match tokio::net::TcpListener::bind(address).await {
+            Ok(listener) => return Ok(listener),
+            Err(e) if e.kind() == std::io::ErrorKind::AddrInUse && tries < 20 => tries += 1,
+            Err(e) => {
+                return Err(Error::new(format!("cannot listen on {address}: {e}"))
+                    .key("--listen")
+                    .help("choose another port (0 takes a free one), or end what uses this one"));
+            }
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
 /// Waits for a signal; then for the workers, as long as they are given.
 pub async fn ended(phase: watch::Sender<Phase>, grace: Duration, mut crew: tokio::task::JoinHandle<()>) {
     let mut signals = signals::listen();
-    signals.recv().await;
+    tokio::select! {
+        _ = signals.recv() => {}
+        // Without workers on purpose they end at once; otherwise one of ours panicked.
+        done = &mut crew => {
+            if let Err(e) = done {
+                tracing::error!(error = %e, "the workers ended by a mistake of ours: start the server again");
+                let _ = phase.send(Phase::Stop);
+                return;
+            }
+            signals.recv().await;
+            let _ = phase.send(Phase::Drain);
+            return;
+        }
+    }
     tracing::info!(
         grace_s = grace.as_secs(),
         "ending: what is under way is finished or given back (again to stop at once)"

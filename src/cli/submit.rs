@@ -121,7 +121,8 @@ fn with_uploads(client: &Client, path: &Path, sets: &[String]) -> anyhow::Result
 fn send(client: &Client, kind: &str, file: &Path) -> Result<String> {
     let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let open = std::fs::File::open(file).map_err(|e| Error::io(file, "cannot be read", &e))?;
-    let answer = client.upload(&format!("/uploads?kind={kind}&name={}", escape(&name)), open)?;
+    let sent = client.upload(&format!("/uploads?kind={kind}&name={}", escape(&name)), open);
+    let answer = sent.map_err(|e| e.in_file(file))?;
     eprintln!("sent {name} ({} bytes)", answer["bytes"]);
     Ok(answer["id"].as_str().unwrap_or_default().to_string())
 }

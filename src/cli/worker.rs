@@ -37,7 +37,10 @@ async fn work(args: Args, launcher: Launcher, pool: Pool) -> anyhow::Result<Exit
         Event::JobEnded { run, outcome, reason: Some(reason), .. } => {
             tracing::warn!(run, outcome, reason, "a trial ended without a result")
         }
-        Event::Trouble { worker, message, again_s } => tracing::error!(worker, message, again_s, "trouble"),
+        // `message` is the name of the sentence itself.
+        Event::Trouble { worker, message, again_s } => {
+            tracing::error!(worker, why = message, again_s, "a worker met trouble and tries again")
+        }
         _ => {}
     });
     let crew = {

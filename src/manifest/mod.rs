@@ -115,7 +115,7 @@ impl Manifest {
                 manifest.source_text = if plain {
                     sources.texts[0].text.clone()
                 } else {
-                    let layers: Vec<String> = sources.texts.iter().map(|s| s.name.display().to_string()).collect();
+                    let layers: Vec<String> = sources.texts.iter().map(|s| sources.reach.shown(&s.name)).collect();
                     format!("# Merged from {}.\n\n{}", layers.join(", ").replace('\n', " "), tree::to_toml(&table))
                 };
                 manifest.sources = sources;

@@ -40,6 +40,12 @@ impl Reach {
         PRESETS.iter().filter(|_| matches!(self, Reach::Within(_))).find(known).map(|(_, preset)| *preset)
     }
 
+    /// What others may read of a file's place: a server tells its name alone.
+    pub fn shown(&self, file: &Path) -> String {
+        let name = file.file_name().filter(|_| matches!(self, Reach::Within(_)));
+        name.map_or_else(|| file.display().to_string(), |n| n.to_string_lossy().into_owned())
+    }
+
     /// The file that `text`, written in a file of `folder`, names.
     ///
     /// # Errors

@@ -55,6 +55,15 @@ pub struct Matrix {
 /// More cells than this are a slip of the pen, not a study.
 pub const MAX_CELLS: u64 = 1_000_000;
 
+/// How many cells the matrix of `manifest` has before anything is excluded: at once, where
+/// [`expand`] makes them all.
+pub fn count(manifest: &Manifest) -> u64 {
+    let mut pool = Pool::default();
+    let product = Block::product(manifest, &mut pool);
+    let more = manifest.include.iter().map(|i| product.with(manifest, i, &mut pool).count(manifest));
+    more.fold(product.count(manifest), u64::saturating_add)
+}
+
 /// All runs of `manifest`.
 ///
 /// # Errors

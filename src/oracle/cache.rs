@@ -2,7 +2,7 @@
 //! methods. A file that is damaged, foreign or of an older oracle is computed anew.
 
 use super::{REVISION, Truth, truth};
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::math::{Camera, Pose};
 use crate::record::Accuracy;
 use crate::scene::Scene;
@@ -59,7 +59,9 @@ fn file(cache_dir: &Path, id: &str) -> PathBuf {
 }
 
 fn cannot_write(path: &Path, e: &std::io::Error) -> Error {
-    Error::io(path, "cannot store the truth", e).help("free some space or choose another cache folder")
+    Error::io(path, "cannot store the truth", e)
+        .kind(ErrorKind::Unavailable)
+        .help("free some space or choose another cache folder")
 }
 
 fn encode(truth: &Truth) -> Vec<u8> {

@@ -277,12 +277,13 @@ fn fill<T>(column: &mut Coded<T>, rows: usize, make: impl FnOnce() -> T) {
 
 fn unhex(text: &str) -> Option<[u8; 16]> {
     let mut out = [0; 16];
-    let digits = text.as_bytes();
-    if digits.len() != 32 || !digits.iter().all(u8::is_ascii_hexdigit) {
+    let (pairs, rest) = text.as_bytes().as_chunks::<2>();
+    if pairs.len() != out.len() || !rest.is_empty() {
         return None;
     }
-    for (byte, pair) in out.iter_mut().zip(digits.chunks(2)) {
-        *byte = u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok()?;
+    let digit = |b: u8| char::from(b).to_digit(16).map(|d| d as u8);
+    for (byte, [high, low]) in out.iter_mut().zip(pairs) {
+        *byte = digit(*high)? << 4 | digit(*low)?;
     }
     Some(out)
 }

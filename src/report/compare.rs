@@ -12,6 +12,7 @@ use crate::record::cameras;
 use crate::registry::format_sum;
 use crate::results::{RunResult, RunStatus, StudyResults};
 use crate::stats;
+use std::collections::{HashMap, VecDeque};
 
 /// What is compared when no metric is named.
 pub const PAIRED: &str = "paired_frame_time";
@@ -58,8 +59,12 @@ pub fn compare<'a>(first: &'a StudyResults, second: &'a StudyResults, metric: &s
     let metric = if metric == PAIRED { None } else { Some(metrics::get(metric)?) };
     let mut taken = vec![false; second.runs.len()];
     let mut pairs = Vec::new();
+    let mut places: HashMap<String, VecDeque<usize>> = HashMap::new();
+    for (i, b) in second.runs.iter().enumerate() {
+        places.entry(cell(b)).or_default().push_back(i);
+    }
     for a in &first.runs {
-        let found = (0..second.runs.len()).find(|i| !taken[*i] && cell(&second.runs[*i]) == cell(a));
+        let found = places.get_mut(&cell(a)).and_then(VecDeque::pop_front);
         if let Some(i) = found {
             taken[i] = true;
         }

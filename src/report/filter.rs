@@ -59,13 +59,17 @@ struct Parser<'a> {
     tokens: Vec<(Token, u32)>,
     at: usize,
     fields: &'a Fields,
+    depth: usize,
 }
+
+/// Levels that a filter may have: each takes of the stack, and filters come from strangers.
+const DEPTH: usize = 64;
 
 impl Filter {
     /// # Errors
     /// Names the column, shows the place, and suggests what was meant.
     pub fn parse(text: &str, fields: &Fields) -> Result<Filter> {
-        let mut parser = Parser { text, tokens: tokens(text)?, at: 0, fields };
+        let mut parser = Parser { text, tokens: tokens(text)?, at: 0, fields, depth: 0 };
         let filter = parser.any()?;
         match parser.peek() {
             Token::End => Ok(filter),
@@ -127,6 +131,16 @@ impl Parser<'_> {
     }
 
     fn one(&mut self) -> Result<Filter> {
+        if self.depth >= DEPTH {
+            return Err(self.wrong(format!("more than {DEPTH} levels of `not` and ("), "write it flatter"));
+        }
+        self.depth += 1;
+        let found = self.term();
+        self.depth -= 1;
+        found
+    }
+
+    fn term(&mut self) -> Result<Filter> {
         if self.keyword("not") {
             return Ok(Filter::Not(Box::new(self.one()?)));
         }

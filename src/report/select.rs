@@ -44,6 +44,40 @@ fn by_code<T>(column: &Coded<T>, ask: impl Fn(&T) -> bool) -> Vec<bool> {
     column.codes.iter().map(|c| answers[*c as usize]).collect()
 }
 
+/// Of values of which there are few: asks each kind once.
+fn by_few<T: PartialEq>(values: &[T], ask: impl Fn(&T) -> bool) -> Vec<bool> {
+    let mut known: Vec<(&T, bool)> = Vec::new();
+    let answer = |value| match known.iter().find(|(k, _)| *k == value) {
+        Some((_, answer)) => *answer,
+        None => {
+            known.push((value, ask(value)));
+            known[known.len() - 1].1
+        }
+    };
+    values.iter().map(answer).collect()
+}
+
+/// Numbers of which each may be another; NaN is none.
+fn of_numbers(found: &[f64], op: Op, values: &[String]) -> Vec<bool> {
+    let parsed = |v: &String| v.parse::<f64>().ok().filter(|x| !x.is_nan());
+    let Some(wanted) = values.iter().map(parsed).collect::<Option<Vec<f64>>>() else {
+        return found.iter().map(|x| !x.is_nan() && holds(op, &Value::Float(*x), values)).collect();
+    };
+    let all = |ask: &dyn Fn(f64) -> bool| found.iter().map(|x| !x.is_nan() && ask(*x)).collect();
+    match (op, &wanted[..]) {
+        (Op::Equal | Op::In, w) => all(&|x| w.contains(&x)),
+        (Op::Unequal | Op::NotIn, w) => all(&|x| !w.contains(&x)),
+        (Op::Less, [w, ..]) => all(&|x| x < *w),
+        (Op::LessEqual, [w, ..]) => all(&|x| x <= *w),
+        (Op::Greater, [w, ..]) => all(&|x| x > *w),
+        (Op::GreaterEqual, [w, ..]) => all(&|x| x >= *w),
+        (Op::Range, [low, high, ..]) => all(&|x| (*low..=*high).contains(&x)),
+        (Op::OutsideRange, [low, high, ..]) => all(&|x| !(*low..=*high).contains(&x)),
+        // The grammar gives every other sign its values.
+        _ => vec![false; found.len()],
+    }
+}
+
 fn test(columns: &Columns, field: &Field, op: Op, values: &[String]) -> Vec<bool> {
     let rows = 0..columns.len();
     let text = |t: &str| holds(op, &Value::Text(t.to_string()), values);
@@ -62,13 +96,16 @@ fn test(columns: &Columns, field: &Field, op: Op, values: &[String]) -> Vec<bool
             Some(column) => by_code(column, |x| !x.is_nan() && holds(op, &Value::Float(*x), values)),
             None => vec![false; columns.len()],
         },
-        Field::Metric(name) => {
-            let i = index(name);
-            let ask = |row| columns.metric(i, row).is_some_and(|(x, _)| holds(op, &Value::Float(x), values));
-            rows.map(ask).collect()
-        }
-        Field::About("status") => columns.status.iter().map(|s| text(status_word(*s))).collect(),
-        Field::About("class") => columns.class.iter().map(|c| c.is_some_and(|c| text(class_word(c)))).collect(),
+        Field::Metric(name) => match columns.metrics.get(&index(name)) {
+            Some(numbers) => {
+                let mut passed = of_numbers(&numbers.value, op, values);
+                passed.resize(columns.len(), false);
+                passed
+            }
+            None => vec![false; columns.len()],
+        },
+        Field::About("status") => by_few(&columns.status, |s| text(status_word(*s))),
+        Field::About("class") => by_few(&columns.class, |c| c.is_some_and(|c| text(class_word(c)))),
         Field::About("machine_class") => by_code(&columns.machine, |m| text(m)),
         Field::About("combination") => by_code(&columns.label, |l| text(l)),
         Field::About("reason") => by_code(&columns.reason, |r| r.as_ref().is_some_and(|r| text(r))),
@@ -166,17 +203,25 @@ struct Key {
 }
 
 fn key(columns: &Columns, field: &Field, descending: bool) -> Key {
-    let ranks = |column: &Coded<String>| {
-        let mut words: Vec<String> = column.values.clone();
+    let ranks = |values: &[String], codes: &[u32]| {
+        let mut words = values.to_vec();
         words.sort();
         words.dedup();
-        let rank: Vec<u32> =
-            column.values.iter().map(|w| words.binary_search(w).expect("one of them") as u32).collect();
-        Keys::Ranks(column.codes.iter().map(|c| rank[*c as usize]).collect(), words)
+        let rank: Vec<u32> = values.iter().map(|w| words.binary_search(w).expect("one of them") as u32).collect();
+        Keys::Ranks(codes.iter().map(|c| rank[*c as usize]).collect(), words)
     };
+    let cells = || Keys::Cells((0..columns.len()).map(|r| cell(columns, r, field)).collect());
     let keys = match field {
-        Field::Axis(name) if columns.labels.contains_key(name.as_str()) => ranks(&columns.labels[name.as_str()]),
-        Field::About("combination") => ranks(&columns.label),
+        Field::Axis(name) => match (columns.labels.get(name.as_str()), columns.axes.get(name)) {
+            (Some(labels), _) => ranks(&labels.values, &labels.codes),
+            (None, Some(column)) => {
+                let words: Vec<String> = column.values.iter().map(|v| format_sum(v)).collect();
+                // A run without a value comes last, either way round.
+                if words.iter().any(String::is_empty) { cells() } else { ranks(&words, &column.codes) }
+            }
+            (None, None) => cells(),
+        },
+        Field::About("combination") => ranks(&columns.label.values, &columns.label.codes),
         Field::Metric(name) => match columns.metrics.get(&index(name)) {
             Some(n) => Keys::Numbers((0..columns.len()).map(|r| n.value.get(r).copied().unwrap_or(f64::NAN)).collect()),
             None => Keys::Numbers(vec![f64::NAN; columns.len()]),
@@ -185,7 +230,7 @@ fn key(columns: &Columns, field: &Field, descending: bool) -> Key {
             let c = &columns.numbers[name];
             Keys::Numbers((0..columns.len()).map(|r| *c.get(r)).collect())
         }
-        _ => Keys::Cells((0..columns.len()).map(|r| cell(columns, r, field)).collect()),
+        _ => cells(),
     };
     Key { keys, descending }
 }

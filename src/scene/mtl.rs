@@ -1,6 +1,7 @@
 //! Wavefront material libraries, as far as culling sees them: which names exist
 //! and which of them let something through.
 
+use super::obj;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -51,16 +52,24 @@ pub fn parse(bytes: &[u8]) -> HashMap<String, Material> {
 /// Library files that an OBJ names, without reading more of it than its keywords.
 pub fn libraries(path: &Path, bytes: &[u8]) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    bytes
-        .split(|b| *b == b'\n')
-        .filter_map(|line| line.trim_ascii_start().strip_prefix(b"mtllib"))
-        .flat_map(|names| resolve(folder, String::from_utf8_lossy(names).trim()))
+    // The reader's own lines and words: what it would read is what is named here.
+    obj::lines(bytes)
+        .filter(|(_, line, _)| obj::split_word(line).0 == b"mtllib")
+        .flat_map(|(_, line, _)| resolve(folder, String::from_utf8_lossy(obj::split_word(&line).1).trim()))
         .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn libraries_are_those_that_the_reader_would_open_however_the_line_is_broken() {
+        let named = |text: &str| libraries(Path::new("x/a.obj"), text.as_bytes());
+        assert_eq!(named("mtllib a.mtl\nv 0 0 0\n mtllib  b.mtl"), [Path::new("x/a.mtl"), Path::new("x/b.mtl")]);
+        assert_eq!(named("mtllib a \\\n../../etc/passwd \\\nb\n").len(), 3, "a backslash goes on with the line");
+        assert!(named("mtllibrary a.mtl\nv 0 0 0").is_empty());
+    }
 
     #[test]
     fn dissolve_transparency_and_maps_make_a_material_see_through() {

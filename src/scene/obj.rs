@@ -142,7 +142,7 @@ fn number_of<K: std::hash::Hash + Eq>(names: &mut HashMap<K, u32>, key: K) -> u3
 
 /// Lines with their number, from 1, and whether a line break ends them. A backslash
 /// at the end joins a line with the next.
-fn lines(bytes: &[u8]) -> impl Iterator<Item = (u32, std::borrow::Cow<'_, [u8]>, bool)> {
+pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u32, std::borrow::Cow<'_, [u8]>, bool)> {
     let mut raw = bytes.split_inclusive(|b| *b == b'\n');
     let mut number = 0u32;
     std::iter::from_fn(move || {
@@ -170,7 +170,7 @@ fn lines(bytes: &[u8]) -> impl Iterator<Item = (u32, std::borrow::Cow<'_, [u8]>,
 }
 
 /// First word and the rest, the white space included.
-fn split_word(line: &[u8]) -> (&[u8], &[u8]) {
+pub(super) fn split_word(line: &[u8]) -> (&[u8], &[u8]) {
     let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
     line.split_at(end)
 }

@@ -171,7 +171,11 @@ impl Store {
 async fn answer_of(tx: &mut Transaction<'_, Sqlite>, job: &Job) -> sqlx::Result<String> {
     sqlx::query_scalar(match job.kind {
         Kind::Trial => "SELECT answer_id FROM measurements WHERE measurement_id = $1",
-        Kind::Judge => "SELECT answer_id FROM measurements WHERE judgement_id = $1 LIMIT 1",
+        // By the cell: another study may have asked for another judgement of the measurement since.
+        Kind::Judge => {
+            "SELECT m.answer_id FROM study_runs r JOIN measurements m ON m.measurement_id = r.measurement_id \
+             WHERE r.judgement_id = $1 UNION ALL SELECT answer_id FROM measurements WHERE judgement_id = $1 LIMIT 1"
+        }
     })
     .bind(&job.target)
     .fetch_one(&mut **tx)

@@ -244,7 +244,8 @@ async fn put(tx: &mut Transaction<'_, Sqlite>, archive: Archive, label: String) 
         .fetch_one(&mut **tx)
         .await?;
     if added > 0 {
-        sqlx::query("UPDATE studies SET sweeps_json = $1 WHERE id = $2")
+        // It came as results; whoever wants the rest of it measured submits it.
+        sqlx::query("UPDATE studies SET sweeps_json = $1, state = 'paused' WHERE id = $2")
             .bind(sweeps_json)
             .bind(study_id)
             .execute(&mut **tx)
@@ -274,18 +275,30 @@ async fn put(tx: &mut Transaction<'_, Sqlite>, archive: Archive, label: String) 
             taken.insert(m.measurement_id.as_str());
         }
     }
+    // Readers that keep results in memory look again, also at what was there before.
+    let now = super::changes::tick(tx).await?;
+    sqlx::query(
+        "UPDATE measurements SET changed = $2 WHERE measurement_id IN (SELECT measurement_id FROM study_runs WHERE \
+         study_id = $1) OR measurement_id IN (SELECT r.measurement_id FROM study_runs r WHERE r.judgement_id IN \
+         (SELECT judgement_id FROM study_runs WHERE study_id = $1))",
+    )
+    .bind(study_id)
+    .bind(now)
+    .execute(&mut **tx)
+    .await?;
     sqlx::query(super::compact::FORGET_ATTEMPTS).execute(&mut **tx).await?;
     let mut trials_added = 0;
     for t in trials.iter().filter(|t| taken.contains(t.measurement_id.as_str())) {
         trials_added += t.insert(tx).await?;
         // So that going on with the study here takes only what is missing.
         sqlx::query(
-            "INSERT INTO jobs (kind, target, repeat_index, take, group_key, order_key, state) \
-             VALUES ('trial', $1, $2, $3, '', 0, 'done') ON CONFLICT DO NOTHING",
+            "INSERT INTO jobs (kind, target, repeat_index, take, group_key, order_key, state, study_id) \
+             VALUES ('trial', $1, $2, $3, '', 0, 'done', $4) ON CONFLICT DO NOTHING",
         )
         .bind(&t.measurement_id)
         .bind(t.repeat_index)
         .bind(t.take)
+        .bind(study_id)
         .execute(&mut **tx)
         .await?;
     }

@@ -6,8 +6,18 @@
 //! so that zstd finds the runs in exponents and high bytes.
 
 use crate::error::{Error, Result};
+use std::cell::RefCell;
+use zstd::bulk::{Compressor, Decompressor};
 
 const LEVEL: i32 = 3;
+
+thread_local! {
+    // Series are short: making the tables anew for each costs more than using them.
+    static COMPRESSOR: RefCell<Compressor<'static>> =
+        RefCell::new(Compressor::new(LEVEL).expect("memory for compressing"));
+    static DECOMPRESSOR: RefCell<Decompressor<'static>> =
+        RefCell::new(Decompressor::new().expect("memory for decompressing"));
+}
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Kind {
@@ -44,7 +54,7 @@ pub fn decode(bytes: &[u8]) -> Result<Vec<f64>> {
     let ([kind, a, b, c, d], frame) = bytes.split_first_chunk::<5>().ok_or_else(damaged)?;
     let count = u32::from_le_bytes([*a, *b, *c, *d]) as usize;
     let width = if *kind == Kind::F64 as u8 { 8 } else { 4 };
-    let raw = zstd::bulk::decompress(frame, count * width).map_err(|_| damaged())?;
+    let raw = DECOMPRESSOR.with_borrow_mut(|z| z.decompress(frame, count * width)).map_err(|_| damaged())?;
     if raw.len() != count * width {
         return Err(damaged());
     }
@@ -96,7 +106,7 @@ fn pack(kind: Kind, count: usize, raw: &[u8]) -> Vec<u8> {
     let count = u32::try_from(count).expect("frames are counted in u32");
     let mut out = vec![kind as u8];
     out.extend_from_slice(&count.to_le_bytes());
-    out.extend(zstd::bulk::compress(raw, LEVEL).expect("compressing memory to memory"));
+    out.extend(COMPRESSOR.with_borrow_mut(|z| z.compress(raw)).expect("compressing memory to memory"));
     out
 }
 

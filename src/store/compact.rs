@@ -38,7 +38,7 @@ impl Store {
             statements.push("DELETE FROM series WHERE role = 'pass'".to_string());
         }
         if drop.orphans {
-            for table in ["trials", "series", "counters"] {
+            for table in ["trials", "series", "counters", "facts"] {
                 statements.push(format!("DELETE FROM {table} WHERE {ORPHANED}"));
             }
             statements.push(format!("DELETE FROM measurements WHERE {ORPHANED}"));

@@ -46,8 +46,25 @@ const HAND_OVER: [&str; 2] = [
      WHERE r.measurement_id = jobs.target AND s.state = 'active' AND s.id <> $1 LIMIT 1), study_id) \
      WHERE study_id = $1 AND kind = 'trial' AND state IN ('queued', 'leased')",
     "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
-     WHERE r.judgement_id = jobs.target AND s.state = 'active' AND s.id <> $1 LIMIT 1), study_id) \
+     WHERE r.judgement_id = jobs.target AND s.state = 'active' AND s.id <> $1 \
+     AND s.machine_class = (SELECT machine_class FROM studies WHERE id = $1) LIMIT 1), study_id) \
      WHERE study_id = $1 AND kind = 'judge' AND state IN ('queued', 'leased')",
+];
+
+/// Jobs of `$1` that its matrix does not hold any more go to another study, or end.
+const LET_GO: [&str; 3] = [
+    "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
+     WHERE r.measurement_id = jobs.target AND s.state = 'active' LIMIT 1), study_id) \
+     WHERE study_id = $1 AND kind = 'trial' AND state IN ('queued', 'leased') AND target NOT IN \
+     (SELECT measurement_id FROM study_runs WHERE study_id = $1)",
+    "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
+     WHERE r.judgement_id = jobs.target AND s.state = 'active' \
+     AND s.machine_class = (SELECT machine_class FROM studies WHERE id = $1) LIMIT 1), study_id) \
+     WHERE study_id = $1 AND kind = 'judge' AND state IN ('queued', 'leased') AND target NOT IN \
+     (SELECT judgement_id FROM study_runs WHERE study_id = $1)",
+    "UPDATE jobs SET state = 'cancelled' WHERE study_id = $1 AND state = 'queued' AND kind IN ('trial', 'judge') \
+     AND target NOT IN (SELECT measurement_id FROM study_runs WHERE study_id = $1) \
+     AND target NOT IN (SELECT judgement_id FROM study_runs WHERE study_id = $1)",
 ];
 
 /// Jobs that `$1` wants and that wait for a study that does not want them now. Cancelled
@@ -59,7 +76,8 @@ const TAKE_BACK: [&str; 2] = [
      AND (state = 'cancelled' OR study_id NOT IN (SELECT id FROM studies WHERE state = 'active'))",
     "UPDATE jobs SET study_id = $1, state = 'queued' WHERE kind = 'judge' AND state IN ('queued', 'cancelled') \
      AND target IN (SELECT judgement_id FROM study_runs WHERE study_id = $1) \
-     AND (state = 'cancelled' OR study_id NOT IN (SELECT id FROM studies WHERE state = 'active'))",
+     AND (state = 'cancelled' OR study_id NOT IN (SELECT id FROM studies WHERE state = 'active' \
+     AND machine_class = (SELECT machine_class FROM studies WHERE id = $1)))",
 ];
 
 impl Store {
@@ -229,12 +247,21 @@ async fn set_state(tx: &mut Transaction<'_, Sqlite>, id: i64, state: StudyState)
     Ok(())
 }
 
+/// After a matrix was replaced.
+pub(super) async fn let_go(tx: &mut Transaction<'_, Sqlite>, id: i64) -> sqlx::Result<()> {
+    for sql in LET_GO {
+        sqlx::query(sql).bind(id).execute(&mut **tx).await?;
+    }
+    Ok(())
+}
+
 /// Level with the least served of those that wait.
 pub(super) async fn join_the_queue(tx: &mut Transaction<'_, Sqlite>, id: i64) -> sqlx::Result<()> {
     for (column, kind) in [("lane_ms", "trial"), ("beside_ms", "judge")] {
         let sql = format!(
             "UPDATE studies SET {column} = max({column}, coalesce((SELECT min(s.{column}) FROM studies s \
-             WHERE s.id <> $1 AND s.state = 'active' AND EXISTS (SELECT 1 FROM jobs j WHERE j.study_id = s.id \
+             WHERE s.id <> $1 AND s.state = 'active' \
+             AND s.machine_class = (SELECT machine_class FROM studies WHERE id = $1) AND EXISTS (SELECT 1 FROM jobs j WHERE j.study_id = s.id \
              AND j.kind = '{kind}' AND j.state = 'queued')), 0)) WHERE id = $1"
         );
         sqlx::query(sqlx::AssertSqlSafe(sql)).bind(id).execute(&mut **tx).await?;

@@ -115,9 +115,10 @@ impl Store {
 
     pub(super) async fn environments_of(&self, study_id: i64) -> Result<BTreeMap<String, Environment>> {
         let rows: Vec<(String, String)> = sqlx::query_as(
-            "SELECT e.machine_class, e.environment_json FROM environments e WHERE e.environment_id IN \
-             (SELECT t.environment_id FROM trials t JOIN study_runs r ON r.measurement_id = t.measurement_id \
-             WHERE r.study_id = $1)",
+            // CROSS: environments are few, and their first trials are mostly of this study.
+            "SELECT e.machine_class, e.environment_json FROM environments e WHERE EXISTS \
+             (SELECT 1 FROM trials t CROSS JOIN study_runs r WHERE t.environment_id = e.environment_id \
+             AND r.measurement_id = t.measurement_id AND r.study_id = $1)",
         )
         .bind(study_id)
         .fetch_all(&self.readers)

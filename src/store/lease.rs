@@ -7,10 +7,11 @@ use sqlx::{Sqlite, SqliteConnection, Transaction};
 use std::time::Duration;
 
 /// While one worker computes a truth, another judgement that needs the same one
-/// would compute it twice: it waits until somebody has finished with that truth.
-const NOT_IN_THE_WAY: &str = "NOT (EXISTS \
-    (SELECT 1 FROM jobs b WHERE b.kind = 'judge' AND b.group_key = j.group_key AND b.state = 'leased') AND NOT EXISTS \
-    (SELECT 1 FROM jobs b WHERE b.kind = 'judge' AND b.group_key = j.group_key AND b.state = 'done'))";
+/// would compute it twice: it waits until somebody has finished with that truth. The
+/// few groups under way are looked up once, not once a job.
+const NOT_IN_THE_WAY: &str = "j.group_key NOT IN (SELECT b.group_key FROM jobs b WHERE b.kind = 'judge' AND \
+    b.state = 'leased' AND NOT EXISTS (SELECT 1 FROM jobs d WHERE d.kind = 'judge' AND d.group_key = b.group_key \
+    AND d.state = 'done'))";
 
 /// The next job of a study: of those that are its turn, or (`shared`) of those that
 /// another study has asked for as well and nobody has done yet.
@@ -75,7 +76,7 @@ impl Store {
     pub async fn lease_any(&self, pool: &Pool, kind: Kind) -> Result<Option<Lease>> {
         let explain = |e: sqlx::Error| self.explain("a lease", &e);
         // Idle workers only read.
-        if self.candidates(&mut *self.readers.acquire().await.map_err(explain)?, pool, kind).await?.is_empty() {
+        if self.candidates(&mut *self.queue.acquire().await.map_err(explain)?, pool, kind).await?.is_empty() {
             return Ok(None);
         }
         let mut tx = self.begin("a lease").await?;
@@ -96,7 +97,7 @@ impl Store {
     /// # Errors
     /// When the database fails.
     pub async fn has_trial_for(&self, pool: &Pool) -> Result<bool> {
-        let mut reader = self.readers.acquire().await.map_err(|e| self.explain("reading the queue", &e))?;
+        let mut reader = self.queue.acquire().await.map_err(|e| self.explain("reading the queue", &e))?;
         Ok(!self.candidates(&mut reader, pool, Kind::Trial).await?.is_empty())
     }
 
@@ -129,23 +130,16 @@ impl Store {
     ) -> Result<Option<Lease>> {
         let explain = |e: sqlx::Error| self.explain("a lease", &e);
         let (now, me) = (now_ms(), owner::this());
-        let row: Option<(i64, String, i64, i64, i64)> = sqlx::query_as(sqlx::AssertSqlSafe(claim(kind, shared)))
-            .bind(study_id)
-            .bind(me)
-            .bind(now + term.as_millis() as i64)
-            .fetch_optional(&mut **tx)
-            .await
-            .map_err(explain)?;
-        let Some((id, target, repeat, take, epoch)) = row else { return Ok(None) };
-        sqlx::query("INSERT INTO attempts (job_id, epoch, owner, started_ms) VALUES ($1, $2, $3, $4)")
-            .bind(id)
-            .bind(epoch)
-            .bind(me)
-            .bind(now)
-            .execute(&mut **tx)
-            .await
-            .map_err(explain)?;
-        let (spec, policy, structure, culling): (String, String, String, String) = sqlx::query_as(match kind {
+        loop {
+            let row: Option<(i64, String, i64, i64, i64)> = sqlx::query_as(sqlx::AssertSqlSafe(claim(kind, shared)))
+                .bind(study_id)
+                .bind(me)
+                .bind(now + term.as_millis() as i64)
+                .fetch_optional(&mut **tx)
+                .await
+                .map_err(explain)?;
+            let Some((id, target, repeat, take, epoch)) = row else { return Ok(None) };
+            let row: Option<(String, String, String, String)> = sqlx::query_as(match kind {
             Kind::Trial => {
                 "SELECT r.spec_json, s.policy_json, r.structure_label, r.culling_label FROM study_runs r JOIN studies s \
                  ON s.id = r.study_id WHERE r.study_id = $1 AND r.measurement_id = $2 LIMIT 1"
@@ -157,13 +151,31 @@ impl Store {
         })
         .bind(study_id)
         .bind(&target)
-        .fetch_one(&mut **tx)
+        .fetch_optional(&mut **tx)
         .await
         .map_err(explain)?;
-        let (spec, policy) = (self.parse(&spec, "a run")?, self.parse(&policy, "a policy")?);
-        let label = super::label(&spec, &structure, &culling);
-        let job = Job { id, kind, target, repeat: repeat as u32, take: take as u32 };
-        Ok(Some(Lease { job, epoch, spec, label, study_id, policy }))
+            let Some((spec, policy, structure, culling)) = row else {
+                // Nobody's any more: the study that it was queued for has another matrix now.
+                sqlx::query("UPDATE jobs SET state = 'cancelled', owner = NULL, lease_until_ms = 0 WHERE id = $1")
+                    .bind(id)
+                    .execute(&mut **tx)
+                    .await
+                    .map_err(explain)?;
+                continue;
+            };
+            sqlx::query("INSERT INTO attempts (job_id, epoch, owner, started_ms) VALUES ($1, $2, $3, $4)")
+                .bind(id)
+                .bind(epoch)
+                .bind(me)
+                .bind(now)
+                .execute(&mut **tx)
+                .await
+                .map_err(explain)?;
+            let (spec, policy) = (self.parse(&spec, "a run")?, self.parse(&policy, "a policy")?);
+            let label = super::label(&spec, &structure, &culling);
+            let job = Job { id, kind, target, repeat: repeat as u32, take: take as u32 };
+            return Ok(Some(Lease { job, epoch, spec, label, study_id, policy }));
+        }
     }
 
     /// Notes the time that a job took, so that studies get equal shares.

@@ -41,8 +41,8 @@ pub mod tokens;
 pub mod uploads;
 
 use crate::error::{Error, Result};
-use sqlx::ConnectOptions;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+use sqlx::{ConnectOptions, Connection};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -72,6 +72,8 @@ pub struct Store {
     path: PathBuf,
     writer: SqlitePool,
     readers: SqlitePool,
+    /// Workers look for jobs here: slow readers must not hold them up.
+    queue: SqlitePool,
 }
 
 impl Store {
@@ -115,13 +117,17 @@ impl Store {
             SqlitePoolOptions::new()
                 .max_connections(connections)
                 .test_before_acquire(false)
+                // A full disk ends a transaction behind sqlx's back: it then fails to roll back, and takes
+                // the connection to be within that transaction for ever.
+                .before_acquire(|c, _| Box::pin(std::future::ready(Ok(!c.is_in_transaction()))))
                 .idle_timeout(None)
                 .max_lifetime(None)
                 .acquire_timeout(Duration::from_secs(60))
         };
         let writer = pool(1).connect_with(options.clone()).await.map_err(|e| error::explain(path, "opening it", &e))?;
-        let readers = pool(4).connect_lazy_with(options);
-        let store = Store { path: path.to_path_buf(), writer, readers };
+        let readers = pool(4).connect_lazy_with(options.clone());
+        let queue = pool(1).connect_lazy_with(options);
+        let store = Store { path: path.to_path_buf(), writer, readers, queue };
         store.prepare().await?;
         Ok(store)
     }
@@ -181,6 +187,7 @@ impl Store {
     /// Closes all connections, so that SQLite folds its write-ahead log into the file.
     pub async fn close(self) {
         self.readers.close().await;
+        self.queue.close().await;
         self.writer.close().await;
     }
 

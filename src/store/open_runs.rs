@@ -31,14 +31,30 @@ impl Store {
         sqlx::query_scalar(
             "SELECT s.id FROM studies s WHERE s.state = 'active' AND s.machine_class = $1 AND s.build_profile IN ('', $2) \
              AND NOT EXISTS (SELECT 1 FROM jobs j WHERE j.study_id = s.id AND j.kind = 'trial' AND j.state IN ('queued', 'leased')) \
-             AND EXISTS (SELECT 1 FROM measurements m JOIN study_runs r ON r.measurement_id = m.measurement_id \
-             WHERE m.status = 'pending' AND r.study_id = s.id)",
+             AND s.id IN (SELECT r.study_id FROM measurements m CROSS JOIN study_runs r \
+             WHERE r.measurement_id = m.measurement_id AND m.status = 'pending')",
         )
         .bind(&pool.machine_class)
         .bind(&pool.build_profile)
         .fetch_all(&self.readers)
         .await
         .map_err(|e| self.explain("reading the studies", &e))
+    }
+
+    /// Whether a job waits or is under way whose turn comes with this study: at once, where
+    /// counting all of them ([`Store::jobs_left`]) takes as long as the study is large.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn has_own_job(&self, study_id: i64) -> Result<bool> {
+        sqlx::query_scalar(
+            "SELECT EXISTS (SELECT 1 FROM jobs WHERE study_id = $1 AND kind IN ('trial', 'judge') \
+             AND state IN ('queued', 'leased'))",
+        )
+        .bind(study_id)
+        .fetch_one(&self.writer)
+        .await
+        .map_err(|e| self.explain("reading the queue", &e))
     }
 
     /// Measurements of the study about which something is to be decided: nobody works on
@@ -49,11 +65,13 @@ impl Store {
     pub async fn loose_ends(&self, study_id: i64) -> Result<Vec<String>> {
         sqlx::query_scalar(
             "SELECT m.measurement_id FROM measurements m JOIN study_runs r ON r.measurement_id = m.measurement_id \
-             WHERE r.study_id = $1 AND m.status = 'pending' AND (NOT EXISTS (SELECT 1 FROM jobs j WHERE \
-             j.kind = 'trial' AND j.target = m.measurement_id AND j.state IN ('queued', 'leased')) OR EXISTS \
-             (SELECT 1 FROM judgements g WHERE g.judgement_id = m.judgement_id AND g.wrong IS NOT NULL) OR EXISTS \
-             (SELECT 1 FROM jobs j WHERE j.kind = 'trial' AND j.target = m.measurement_id AND j.state = 'failed') OR \
-             EXISTS (SELECT 1 FROM jobs j WHERE j.kind = 'judge' AND j.target = m.judgement_id AND j.state = 'failed')) \
+             WHERE r.study_id = $1 AND m.status = 'pending' AND ((NOT EXISTS (SELECT 1 FROM jobs j WHERE \
+             j.kind = 'trial' AND j.target = m.measurement_id AND j.state IN ('queued', 'leased')) AND NOT EXISTS \
+             (SELECT 1 FROM jobs j WHERE j.kind = 'judge' AND j.target = r.judgement_id AND j.state IN ('queued', 'leased'))) \
+             OR EXISTS \
+             (SELECT 1 FROM judgements g WHERE g.judgement_id = r.judgement_id AND g.wrong IS NOT NULL) OR EXISTS \
+             (SELECT 1 FROM jobs j WHERE j.kind = 'trial' AND j.target = m.measurement_id AND +j.state = 'failed') OR \
+             EXISTS (SELECT 1 FROM jobs j WHERE j.kind = 'judge' AND j.target = r.judgement_id AND +j.state = 'failed')) \
              GROUP BY m.measurement_id ORDER BY min(r.ordinal)",
         )
         .bind(study_id)

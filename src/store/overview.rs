@@ -112,7 +112,12 @@ impl Store {
         let explain = |e: sqlx::Error| self.explain("reading the studies", &e);
         let list = serde_json::to_string(ids).expect("numbers");
         let now = self.now().await?;
-        let changed = self.changed_since(counted.values().map(|c| c.at).min().unwrap_or(0)).await?;
+        // Those asked for alone: of a study that nobody looks at everything is new.
+        let known = ids.iter().filter_map(|id| counted.get(id));
+        let changed = match known.map(|c| c.at).min() {
+            Some(at) if at < now => self.changed_since(at).await?,
+            _ => HashSet::new(),
+        };
         let sql = format!("{ROW} WHERE s.id IN (SELECT value FROM json_each($1))");
         let rows: Vec<Row> =
             sqlx::query_as(sqlx::AssertSqlSafe(sql)).bind(&list).fetch_all(&self.readers).await.map_err(explain)?;
@@ -125,6 +130,7 @@ impl Store {
             };
             counted.insert(row.id, Counts { at: now, submitted_ms: row.submitted_ms, runs });
             let state = StudyState::of(&row.state);
+            let left = jobs.get(&row.id).copied().unwrap_or_default();
             let overview = Overview {
                 id: row.id,
                 reference: format!("{}@{}", row.name, row.series),
@@ -138,8 +144,8 @@ impl Store {
                 submitted: utc(row.submitted_ms),
                 runs,
                 excluded: row.excluded as u64,
-                jobs: jobs.get(&row.id).copied().unwrap_or_default(),
-                finished: runs.pending == 0 || state == StudyState::Cancelled,
+                jobs: left,
+                finished: state == StudyState::Cancelled || (runs.pending == 0 && left.trials + left.judgements == 0),
             };
             found.insert(overview.id, overview);
         }
@@ -149,8 +155,9 @@ impl Store {
     /// Studies that hold a measurement which changed after `at`, or were submitted anew.
     async fn changed_since(&self, at: i64) -> Result<HashSet<i64>> {
         let ids: Vec<i64> = sqlx::query_scalar(
-            "SELECT DISTINCT r.study_id FROM measurements m JOIN study_runs r ON r.measurement_id = m.measurement_id \
-             WHERE m.changed > $1",
+            // CROSS: from what changed, which is little, to its studies.
+            "SELECT DISTINCT r.study_id FROM measurements m CROSS JOIN study_runs r \
+             WHERE r.measurement_id = m.measurement_id AND m.changed > $1",
         )
         .bind(at)
         .fetch_all(&self.readers)

@@ -89,11 +89,13 @@ impl Store {
     /// # Errors
     /// When the database fails.
     pub async fn renew(&self, lease: &Lease) -> Result<bool> {
-        let sql = "UPDATE jobs SET lease_until_ms = $3 WHERE id = $1 AND epoch = $2 AND state = 'leased'";
+        let sql =
+            "UPDATE jobs SET lease_until_ms = $3 WHERE id = $1 AND epoch = $2 AND state = 'leased' AND target = $4";
         let done = sqlx::query(sql)
             .bind(lease.job.id)
             .bind(lease.epoch)
             .bind(now_ms() + LEASE.as_millis() as i64)
+            .bind(&lease.job.target)
             .execute(&self.writer)
             .await
             .map_err(|e| self.explain("a lease", &e))?;
@@ -125,7 +127,7 @@ impl Store {
     /// When the database fails.
     pub async fn return_orphans(&self) -> Result<u64> {
         let explain = |e: sqlx::Error| self.explain("the leases", &e);
-        let mut tx = self.begin("the leases").await?;
+        let mut tx = self.begin("a lease").await?;
         let leased: Vec<(i64, String)> = sqlx::query_as("SELECT id, owner FROM jobs WHERE state = 'leased'")
             .fetch_all(&mut *tx)
             .await

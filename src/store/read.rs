@@ -123,6 +123,12 @@ impl Store {
             .await
             .map_err(explain)?;
         let runs = self.runs_of(&rows, Scope::Study(study.id), Scope::Study(study.id), detail).await?;
+        self.around(study, runs).await
+    }
+
+    /// What belongs to a study besides its runs.
+    async fn around(&self, study: StudyRow, runs: Vec<RunResult>) -> Result<StudyResults> {
+        let explain = |e: sqlx::Error| self.explain("reading the study", &e);
         let excluded: Vec<(String, String, i64)> =
             sqlx::query_as("SELECT cell, why, cells FROM excluded WHERE study_id = $1 ORDER BY ordinal")
                 .bind(study.id)
@@ -143,6 +149,16 @@ impl Store {
             environments: self.environments_of(study.id).await?,
             consolidate_frames: study.consolidate_frames as u32,
         })
+    }
+
+    /// As [`Store::results_with`] of some runs, by their measurements.
+    ///
+    /// # Errors
+    /// As [`Store::results`].
+    pub async fn results_of(&self, study: &str, ids: &[String], detail: Detail) -> Result<StudyResults> {
+        let row = self.find(study).await?;
+        let runs = self.some_results(row.id, ids, detail).await?;
+        self.around(row, runs).await
     }
 
     /// Some runs of a study by their measurements, in the order of the matrix.
@@ -215,13 +231,20 @@ impl Store {
         if let Some(row) = row {
             return Ok(row);
         }
-        let all = self.studies().await?;
-        let names: Vec<String> = all.iter().map(|s| format!("{}@{}", s.name, s.series)).collect();
-        let near = did_you_mean(name, all.iter().map(|s| s.name.as_str()));
+        let all: Vec<(String, i64)> =
+            sqlx::query_as("SELECT name, series FROM studies ORDER BY submitted_ms DESC, id DESC LIMIT 200")
+                .fetch_all(&self.readers)
+                .await
+                .map_err(|e| self.explain("reading the studies", &e))?;
+        let names: Vec<String> = all.iter().take(12).map(|(name, series)| format!("{name}@{series}")).collect();
+        let near = did_you_mean(name, all.iter().map(|s| s.0.as_str()));
         let help = match near {
             Some(near) if near != name => format!("did you mean `{near}`?"),
             _ if names.is_empty() => "it holds no study yet: `cullmark run experiments/quick.toml`".to_string(),
-            _ => format!("it holds: {}", names.join(", ")),
+            _ => {
+                let more = if all.len() > names.len() { ", and more" } else { "" };
+                format!("it holds: {}{more}", names.join(", "))
+            }
         };
         Err(Error::new(format!("there is no study `{study}` in the database"))
             .in_file(&self.path)

@@ -18,7 +18,8 @@ pub(super) fn trial_order(block: i64, repeat: u32, seed: u64, measurement_id: &s
 /// (paused, cancelled, deleted) becomes ours.
 const TAKE_OVER: &str = " ON CONFLICT (kind, target, repeat_index, take) DO UPDATE SET state = 'queued', \
     study_id = excluded.study_id WHERE jobs.state = 'cancelled' OR (jobs.state = 'queued' AND jobs.study_id NOT IN \
-    (SELECT id FROM studies WHERE state = 'active'))";
+    (SELECT id FROM studies WHERE state = 'active' AND machine_class = \
+    (SELECT machine_class FROM studies WHERE id = excluded.study_id)))";
 
 pub(super) async fn insert_measurements(
     tx: &mut Transaction<'_, Sqlite>,

@@ -17,7 +17,7 @@ pub struct TrialLine {
     pub build_ms: Option<f64>,
     pub prepare_ms: Option<f64>,
     pub load_ms: Option<f64>,
-    pub peak_rss_mib: f64,
+    pub peak_rss_mib: Option<f64>,
     pub noise: f64,
     pub noisy: bool,
 }
@@ -75,7 +75,7 @@ impl Store {
             build_ms: Some(build as f64 / 1e6),
             prepare_ms: Some(prepare as f64 / 1e6),
             load_ms: Some(load as f64 / 1e6),
-            peak_rss_mib: rss as f64 / f64::from(1 << 20),
+            peak_rss_mib: Some(rss as f64 / f64::from(1 << 20)),
             noise,
             noisy: noisy != 0,
         };
@@ -116,6 +116,23 @@ impl Store {
             attempts.into_iter().map(attempt).collect(),
             environment.map(|json| self.parse(&json, "an environment")).transpose()?,
         ))
+    }
+
+    /// Bytes of the stored series of some runs: what reading their frames costs.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn series_bytes(&self, ids: &[String]) -> Result<u64> {
+        let list = serde_json::to_string(ids).expect("ids are text");
+        let bytes: i64 = sqlx::query_scalar(
+            "SELECT coalesce(sum(length(data)), 0) FROM series WHERE role = 'series' AND measurement_id IN \
+             (SELECT value FROM json_each($1))",
+        )
+        .bind(&list)
+        .fetch_one(&self.readers)
+        .await
+        .map_err(|e| self.explain("reading series", &e))?;
+        Ok(bytes as u64)
     }
 
     /// Every series of a run: the best take of each trial, counted ones once.

@@ -56,10 +56,45 @@ impl Store {
     pub async fn settle(&self, study_id: i64, measurement_id: &str, policy: &RepeatPolicy) -> Result<Settled> {
         let explain = |e: sqlx::Error| self.explain("a decision", &e);
         let mut tx = self.begin("a decision").await?;
-        let mut settled = self.decide(&mut tx, study_id, measurement_id, policy).await?;
+        let policy = self.strictest(&mut tx, measurement_id, policy).await?;
+        let mut settled = self.decide(&mut tx, study_id, measurement_id, &policy).await?;
         settled.trials_cancelled = write(&mut tx, measurement_id, &settled).await.map_err(explain)?;
         tx.commit().await.map_err(explain)?;
         Ok(settled)
+    }
+
+    /// A shared measurement goes on until it suits every active study that has it.
+    async fn strictest(
+        &self,
+        tx: &mut Transaction<'_, Sqlite>,
+        measurement_id: &str,
+        policy: &RepeatPolicy,
+    ) -> Result<RepeatPolicy> {
+        let others: Vec<String> = sqlx::query_scalar(
+            "SELECT DISTINCT s.policy_json FROM study_runs r JOIN studies s ON s.id = r.study_id \
+             WHERE r.measurement_id = $1 AND s.state = 'active'",
+        )
+        .bind(measurement_id)
+        .fetch_all(&mut **tx)
+        .await
+        .map_err(|e| self.explain("a decision", &e))?;
+        let mut out = policy.clone();
+        if others.len() < 2 {
+            return Ok(out);
+        }
+        // Who asks for no width stops at the repeats asked for.
+        let most = |p: &RepeatPolicy| if p.relative_ci.is_some() { p.max_repeats } else { p.repeats };
+        out.max_repeats = most(&out);
+        for json in others {
+            let other: RepeatPolicy = self.parse(&json, "a policy")?;
+            out.repeats = out.repeats.max(other.repeats);
+            out.max_repeats = out.max_repeats.max(most(&other));
+            out.relative_ci = match (out.relative_ci, other.relative_ci) {
+                (Some(a), Some(b)) => Some(a.min(b)),
+                (a, b) => a.or(b),
+            };
+        }
+        Ok(out)
     }
 
     async fn decide(
@@ -70,12 +105,16 @@ impl Store {
         policy: &RepeatPolicy,
     ) -> Result<Settled> {
         let explain = |e: sqlx::Error| self.explain("a decision", &e);
-        let known: Option<(String, String)> =
-            sqlx::query_as("SELECT answer_id, judgement_id FROM measurements WHERE measurement_id = $1")
-                .bind(measurement_id)
-                .fetch_optional(&mut **tx)
-                .await
-                .map_err(explain)?;
+        // The judgement that this study asked for; another may ask for another.
+        let known: Option<(String, String)> = sqlx::query_as(
+            "SELECT m.answer_id, coalesce((SELECT r.judgement_id FROM study_runs r WHERE r.measurement_id = $1 AND \
+             r.study_id = $2 LIMIT 1), m.judgement_id) FROM measurements m WHERE m.measurement_id = $1",
+        )
+        .bind(measurement_id)
+        .bind(study_id)
+        .fetch_optional(&mut **tx)
+        .await
+        .map_err(explain)?;
         // Deleted while somebody worked on it: nothing is left to decide.
         let Some((answer_id, judgement_id)) = known else { return Ok(Settled::PENDING) };
         let rows: Vec<TrialRow> = sqlx::query_as(
@@ -225,8 +264,10 @@ impl Store {
         let round = if take == 0 { repeat } else { 0xffff };
         sqlx::query(
             "INSERT INTO jobs (kind, target, repeat_index, take, group_key, order_key, state, study_id) \
-             VALUES ('trial', $1, $2, $3, '', $4, 'queued', $5) ON CONFLICT (kind, target, repeat_index, take) \
-             DO UPDATE SET state = 'queued' WHERE jobs.state = 'cancelled'",
+             VALUES ('trial', $1, $2, $3, '', $4, 'queued', coalesce((SELECT s.id FROM study_runs r JOIN studies s ON \
+             s.id = r.study_id WHERE r.measurement_id = $1 AND s.state = 'active' ORDER BY s.id <> $5 LIMIT 1), $5)) ON CONFLICT (kind, target, repeat_index, take) \
+             DO UPDATE SET state = 'queued', study_id = excluded.study_id, order_key = excluded.order_key, attempts = 0 \
+             WHERE jobs.state = 'cancelled'",
         )
         .bind(measurement_id)
         .bind(i64::from(repeat))
@@ -283,7 +324,7 @@ async fn failed_job(
     judgement_id: &str,
 ) -> sqlx::Result<Option<String>> {
     let row: Option<(String, i64, Option<String>)> = sqlx::query_as(
-        "SELECT kind, repeat_index, reason FROM jobs WHERE state = 'failed' AND ((kind = 'trial' AND target = $1) OR \
+        "SELECT kind, repeat_index, reason FROM jobs WHERE +state = 'failed' AND ((kind = 'trial' AND target = $1) OR \
          (kind = 'judge' AND target = $2)) ORDER BY kind, repeat_index LIMIT 1",
     )
     .bind(measurement_id)
@@ -304,9 +345,11 @@ async fn write(tx: &mut Transaction<'_, Sqlite>, measurement_id: &str, s: &Settl
         RunStatus::Wrong => "wrong",
     };
     let finished = (s.status != RunStatus::Pending).then(now_ms);
+    // What stays open looks to readers as it did.
+    let changed = if s.status == RunStatus::Pending { None } else { Some(changes::tick(tx).await?) };
     sqlx::query(
         "UPDATE measurements SET status = $2, reason = $3, stop_reason = $4, repeats = $5, finished_ms = $6, \
-         changed = $7 WHERE measurement_id = $1",
+         changed = coalesce($7, changed) WHERE measurement_id = $1",
     )
     .bind(measurement_id)
     .bind(status)
@@ -314,7 +357,7 @@ async fn write(tx: &mut Transaction<'_, Sqlite>, measurement_id: &str, s: &Settl
     .bind(&s.stop_reason)
     .bind(i64::from(s.repeats))
     .bind(finished)
-    .bind(changes::tick(tx).await?)
+    .bind(changed)
     .execute(&mut **tx)
     .await?;
     if matches!(s.status, RunStatus::Failed | RunStatus::Wrong) {

@@ -116,6 +116,7 @@ fn ids_of(spec: &RunSpec, machine_class: &str) -> Ids {
 async fn submit(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]) -> sqlx::Result<Submitted> {
     let blocks = blocks(&s.cells);
     let study_id = put_study(tx, s, ids, &blocks).await?;
+    control::let_go(tx, study_id).await?;
     if s.retry_failed {
         retry_failed(tx, study_id).await?;
     }
@@ -298,17 +299,17 @@ pub(super) async fn retry_failed(tx: &mut Transaction<'_, Sqlite>, study_id: i64
             disagreed.replace("m.measurement_id FROM", "m.answer_id FROM")
         ),
         format!(
-            "UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'trial' AND target IN ({disagreed})"
+            "UPDATE jobs SET state = 'queued', study_id = $1, attempts = 0, reason = NULL WHERE kind = 'trial' AND target IN ({disagreed})"
         ),
         format!(
-            "UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'judge' AND state = 'done' AND target IN ({judged}) \
+            "UPDATE jobs SET state = 'queued', study_id = $1, attempts = 0, reason = NULL WHERE kind = 'judge' AND state = 'done' AND target IN ({judged}) \
                  AND NOT EXISTS (SELECT 1 FROM judgements j WHERE j.judgement_id = jobs.target)"
         ),
         format!(
-            "UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'trial' AND state IN ('failed', 'cancelled') AND target IN ({failed})"
+            "UPDATE jobs SET state = 'queued', study_id = $1, attempts = 0, reason = NULL WHERE kind = 'trial' AND state IN ('failed', 'cancelled') AND target IN ({failed})"
         ),
         format!(
-            "UPDATE jobs SET state = 'queued', attempts = 0, reason = NULL WHERE kind = 'judge' AND state IN ('failed', 'cancelled') AND target IN ({judged})"
+            "UPDATE jobs SET state = 'queued', study_id = $1, attempts = 0, reason = NULL WHERE kind = 'judge' AND state IN ('failed', 'cancelled') AND target IN ({judged})"
         ),
         format!(
             "UPDATE measurements SET status = 'pending', reason = NULL, stop_reason = NULL, finished_ms = NULL, \

@@ -4,13 +4,14 @@
 //! started and Ctrl-C on the terminal reaches the worker alone. It dies with the
 //! worker, so that nothing keeps computing on the measuring lane unseen.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::machine;
 use crate::record::RunSpec;
 use crate::store::Kind;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
+use std::sync::{OnceLock, mpsc};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
 use tokio::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command};
@@ -59,6 +60,9 @@ struct Reply<T> {
 struct Named {
     message: String,
     help: Option<String>,
+    /// Not the run's fault (a full disk): it may do later.
+    #[serde(default)]
+    unavailable: bool,
 }
 
 impl Launcher {
@@ -84,7 +88,7 @@ impl Launcher {
     /// Runs one job to its end or `limit`. Dropping the future kills the child.
     ///
     /// # Errors
-    /// When the child cannot be started at all.
+    /// When the child cannot be started at all, or met trouble that is not the run's.
     pub async fn run<T: for<'a> Deserialize<'a>>(&self, request: &Request<'_>, limit: Duration) -> Result<Ended<T>> {
         let input = serde_json::to_vec(request).expect("a request is plain data");
         let mut child = self.spawn(request.job)?;
@@ -111,7 +115,7 @@ impl Launcher {
         };
         group.0 = None;
         let status = status.map_err(|e| Error::new(format!("waiting for a child process: {e}")))?;
-        Ok(interpret(&out, &err, status, request.memory_limit_mib))
+        interpret(&out, &err, status, request.memory_limit_mib)
     }
 
     /// Asks a verb of the program one thing, beside the measuring lane: JSON in, whatever
@@ -166,18 +170,47 @@ impl Launcher {
         command.process_group(0);
         #[cfg(target_os = "linux")]
         die_with_worker(&mut command);
-        // Affinity is inherited: a trial may build on every core and then pins itself to the lane.
-        if kind == Kind::Trial && self.lane_core.is_some() {
-            let _ = machine::pin_to(&self.cores);
-        }
-        let child = command.spawn();
-        self.leave_the_lane();
+        let launcher = self.clone();
+        let child = on_the_spawner(move || {
+            // Affinity is inherited: a trial may build on every core and then pins itself to the lane.
+            if kind == Kind::Trial && launcher.lane_core.is_some() {
+                let _ = machine::pin_to(&launcher.cores);
+            }
+            let child = command.spawn();
+            launcher.leave_the_lane();
+            child
+        });
         child.map_err(|e| {
             Error::new(format!("the program for trials cannot be started: {e}"))
                 .in_file(&self.exe)
                 .help("was it moved or rebuilt while a study ran? start the study again: it goes on where it stopped")
         })
     }
+}
+
+/// Starts children on a thread that never ends: the system's promise to kill a child
+/// when its parent dies is about the *thread* that forked it, and threads of a runtime
+/// come and go.
+fn on_the_spawner(spawn: impl FnOnce() -> std::io::Result<Child> + Send + 'static) -> std::io::Result<Child> {
+    type Work = Box<dyn FnOnce() + Send>;
+    static SPAWNER: OnceLock<mpsc::Sender<Work>> = OnceLock::new();
+    let spawner = SPAWNER.get_or_init(|| {
+        let (sender, receiver) = mpsc::channel::<Work>();
+        std::thread::Builder::new()
+            .name("spawner".into())
+            .spawn(move || receiver.iter().for_each(|work| work()))
+            .expect("a thread can be started");
+        sender
+    });
+    let (sender, receiver) = mpsc::channel();
+    // The runtime must know of the child, to tell when it ends.
+    let runtime = tokio::runtime::Handle::current();
+    let work = move || {
+        let _entered = runtime.enter();
+        let _ = sender.send(spawn());
+    };
+    spawner.send(Box::new(work)).expect("the spawner never ends");
+    receiver.recv().expect("the spawner answers")
 }
 
 /// What [`Launcher::ask`] brought.
@@ -256,17 +289,21 @@ fn interpret<T: for<'a> Deserialize<'a>>(
     err: &str,
     status: ExitStatus,
     memory_limit_mib: Option<u64>,
-) -> Ended<T> {
+) -> Result<Ended<T>> {
     let said = if err.is_empty() { "it wrote nothing to standard error".to_string() } else { err.to_string() };
     // The system's answer to a refused allocation is an abort; the reason is the limit.
     if let Some(mib) = memory_limit_mib
         && !status.success()
         && ["memory allocation of", "out of memory", "Cannot allocate memory"].iter().any(|w| err.contains(w))
     {
-        return Ended::Refused(format!("ran into its memory limit of {mib} MiB ({})", last_line(err)));
+        return Ok(Ended::Refused(format!("ran into its memory limit of {mib} MiB ({})", last_line(err))));
     }
-    match (status.code(), serde_json::from_slice::<Reply<T>>(out)) {
+    Ok(match (status.code(), serde_json::from_slice::<Reply<T>>(out)) {
         (Some(0), Ok(Reply { ok: Some(answer), .. })) => Ended::Answered(answer),
+        (Some(1), Ok(Reply { error: Some(e), .. })) if e.unavailable => {
+            let error = Error::new(e.message).kind(ErrorKind::Unavailable);
+            return Err(e.help.into_iter().fold(error, Error::help));
+        }
         (Some(1), Ok(Reply { error: Some(e), .. })) => Ended::Refused(match e.help {
             Some(help) => format!("{} (help: {help})", e.message),
             None => e.message,
@@ -275,7 +312,7 @@ fn interpret<T: for<'a> Deserialize<'a>>(
         (Some(101), _) => Ended::Crashed(format!("panicked: {said}")),
         (Some(code), _) => Ended::Crashed(format!("exit code {code}: {said}")),
         (None, _) => Ended::Crashed(format!("{}: {said}", signal(status))),
-    }
+    })
 }
 
 fn last_line(text: &str) -> &str {
@@ -320,7 +357,14 @@ mod tests {
     use std::os::unix::process::ExitStatusExt;
 
     fn read(out: &str, err: &str, raw: i32) -> Ended<u32> {
-        interpret(out.as_bytes(), err, ExitStatus::from_raw(raw), Some(64))
+        interpret(out.as_bytes(), err, ExitStatus::from_raw(raw), Some(64)).unwrap()
+    }
+
+    #[test]
+    fn trouble_that_is_not_the_runs_is_an_error_of_the_worker() {
+        let out = r#"{"error":{"message":"no space left","help":"free some","unavailable":true}}"#;
+        let e = interpret::<u32>(out.as_bytes(), "", ExitStatus::from_raw(1 << 8), None).unwrap_err();
+        assert!(e.kind == ErrorKind::Unavailable && e.help.is_some() && e.message == "no space left");
     }
 
     #[test]

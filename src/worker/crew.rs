@@ -26,6 +26,9 @@ const RECOUNT: Duration = Duration::from_secs(2);
 /// the machine after so long.
 const BEAT: Duration = Duration::from_secs(1);
 
+/// So long before it runs out a lease that could not be renewed is given up.
+const SLACK: Duration = Duration::from_secs(5);
+
 pub(super) enum Scope {
     Study(i64),
     Every(Pool),
@@ -41,6 +44,8 @@ pub(super) struct Crew {
     pub(super) wake: Arc<Notify>,
     left: Mutex<Left>,
     counted: Mutex<Instant>,
+    /// Leases that could not even be given back: while we live, nobody else knows that nobody works.
+    owed: Mutex<Vec<Lease>>,
 }
 
 impl Crew {
@@ -61,6 +66,7 @@ impl Crew {
             wake,
             left: Mutex::new(Left::default()),
             counted: Mutex::new(Instant::now()),
+            owed: Mutex::default(),
         }
     }
 
@@ -76,7 +82,10 @@ impl Crew {
                 return Ok(());
             }
             // Nothing to take. Others may still work on what will become more jobs, or may have died.
-            if self.store.jobs_left(study_id).await? == Left::default() && self.settle_all(study_id).await? == 0 {
+            if !self.store.has_own_job(study_id).await?
+                && self.store.jobs_left(study_id).await? == Left::default()
+                && self.settle_all(study_id).await? == 0
+            {
                 return Ok(());
             }
             if looked.elapsed() > Duration::from_secs(1) {
@@ -90,6 +99,7 @@ impl Crew {
 
     /// One job of each kind, if there are any; false if there was none.
     pub(super) async fn round(&self, worker: usize, kinds: &[Kind], lane: &Lane) -> Result<bool> {
+        self.give_back_owed().await?;
         let mut worked = false;
         for kind in kinds {
             worked |= match kind {
@@ -176,11 +186,22 @@ impl Crew {
         };
         let Some(lease) = lease else { return Ok(false) };
         let done = self.job(worker, &lease).await;
-        if done.is_err() {
-            // Others may take it at once; if even that fails, the lease runs out.
-            let _ = self.store.give_back(&lease).await;
+        // Others may take it at once.
+        if done.is_err() && self.store.give_back(&lease).await.is_err() {
+            self.owed.lock().unwrap_or_else(PoisonError::into_inner).push(lease);
         }
         done.map(|()| true)
+    }
+
+    async fn give_back_owed(&self) -> Result<()> {
+        loop {
+            let owed = self.owed.lock().unwrap_or_else(PoisonError::into_inner).pop();
+            let Some(lease) = owed else { return Ok(()) };
+            if let Err(e) = self.store.give_back(&lease).await {
+                self.owed.lock().unwrap_or_else(PoisonError::into_inner).push(lease);
+                return Err(e);
+            }
+        }
     }
 
     async fn job(&self, worker: usize, lease: &Lease) -> Result<()> {
@@ -196,16 +217,18 @@ impl Crew {
             take: lease.job.take,
         });
         let start = Instant::now();
-        let (outcome, reason) = match kind {
-            Kind::Trial => self.trial(lease, start).await?,
-            Kind::Judge => self.judge(lease, start).await?,
+        let done = match kind {
+            Kind::Trial => self.trial(lease, start).await,
+            Kind::Judge => self.judge(lease, start).await,
         };
+        // Whatever came of it: a job that always fails must not keep its study next in turn.
+        if matches!(self.scope, Scope::Every(_)) {
+            self.store.charge(lease, start.elapsed()).await?;
+        }
+        let (outcome, reason) = done?;
         // Otherwise it is not done and waits again.
         if !matches!(outcome, "returned" | "crashed") {
             self.count_off(kind, -1);
-        }
-        if matches!(self.scope, Scope::Every(_)) {
-            self.store.charge(lease, start.elapsed()).await?;
         }
         let concerned = match kind {
             Kind::Trial => vec![(study_id, lease.job.target.clone())],
@@ -236,7 +259,7 @@ impl Crew {
     }
 
     async fn trial(&self, lease: &Lease, start: Instant) -> Result<(&'static str, Option<String>)> {
-        let limit = Duration::from_secs_f64(lease.policy.timeout_s);
+        let limit = limit(lease.policy.timeout_s);
         let Some(ended) = self.child::<TrialRecord>(lease, limit, lease.policy.memory_limit_mib).await? else {
             return Ok(("returned", None));
         };
@@ -249,7 +272,7 @@ impl Crew {
     }
 
     async fn judge(&self, lease: &Lease, start: Instant) -> Result<(&'static str, Option<String>)> {
-        let limit = Duration::from_secs_f64(lease.policy.timeout_s * JUDGE_TIME);
+        let limit = limit(lease.policy.timeout_s * JUDGE_TIME);
         // The memory limit is on the method under test, not on our ground truth.
         let Some(ended) = self.child::<Judgement>(lease, limit, None).await? else {
             return Ok(("returned", None));
@@ -285,6 +308,7 @@ impl Crew {
             Request { job: lease.job.kind, spec: &lease.spec, cache_dir: &self.options.cache_dir, memory_limit_mib };
         let mut beat = tokio::time::interval(BEAT.min(queue::LEASE / 3));
         beat.tick().await;
+        let mut held = Instant::now();
         let child = self.options.launcher.run::<T>(&request, limit);
         tokio::pin!(child);
         loop {
@@ -303,11 +327,13 @@ impl Crew {
                     self.store.give_back(lease).await?;
                     return Ok(None);
                 }
-                _ = beat.tick() => {
-                    if !self.store.renew(lease).await? {
-                        return Ok(None);
-                    }
-                }
+                _ = beat.tick() => match self.store.renew(lease).await {
+                    Ok(true) => held = Instant::now(),
+                    Ok(false) => return Ok(None),
+                    // A database that is busy for a while is no reason to throw minutes of work away.
+                    Err(_) if held.elapsed() + SLACK < queue::LEASE => {}
+                    Err(e) => return Err(e),
+                },
             }
         }
     }
@@ -341,6 +367,11 @@ impl Crew {
         }
         Ok(settled)
     }
+}
+
+/// A year is no limit, and no duration overflows.
+fn limit(seconds: f64) -> Duration {
+    Duration::from_secs_f64(seconds.clamp(0.0, 365.0 * 86400.0))
 }
 
 fn accepted(how: Accepted) -> &'static str {

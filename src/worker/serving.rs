@@ -6,6 +6,7 @@ use super::lane::Lane;
 use super::{Event, Phase};
 use crate::error::Result;
 use crate::store::Kind;
+use std::collections::HashMap;
 use std::time::Duration;
 
 /// How long one of a pool does, unless it is roused: other processes may have submitted.
@@ -48,11 +49,18 @@ impl Crew {
     /// Returns the leases of dead workers, and decides about runs that nobody works on any more.
     pub async fn mend(&self) {
         let Scope::Every(pool) = &self.scope else { return };
+        // What the last look left open is not looked at again until something changed.
+        let mut looked: HashMap<i64, (i64, usize)> = HashMap::new();
         while self.phase() == Phase::Work {
             let once = async {
                 self.store.return_orphans().await?;
                 for study_id in self.store.undecided(pool).await? {
-                    self.settle_all(study_id).await?;
+                    let state = (self.store.now().await?, self.store.loose_ends(study_id).await?.len());
+                    if state.1 > 0 && looked.get(&study_id) != Some(&state) {
+                        self.settle_all(study_id).await?;
+                        looked
+                            .insert(study_id, (self.store.now().await?, self.store.loose_ends(study_id).await?.len()));
+                    }
                 }
                 Ok(())
             };

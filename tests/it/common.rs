@@ -47,3 +47,28 @@ pub fn soup(seed: u64, count: usize, half_m: f64, edge_m: f64) -> Scene {
     scene.anchor();
     scene
 }
+
+/// A town of `n` x `n` boxes as OBJ, z up, and a walk of 20 frames through it as CSV.
+pub fn town(n: usize) -> (String, String) {
+    let (mut mesh, mut base) = (String::new(), 1);
+    for i in 0..n * n {
+        let (x, y, h) = ((i / n) as f64 * 4.0, (i % n) as f64 * 4.0, 1.0 + (i % 5) as f64);
+        for z in [0.0, h] {
+            for (a, b) in [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)] {
+                mesh += &format!("v {} {} {z}\n", x + a, y + b);
+            }
+        }
+        for [a, b, c, d] in [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+            .map(|q| q.map(|k| base + k))
+        {
+            mesh += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+        }
+        base += 8;
+    }
+    let mut walk = "frame,px,py,pz,fx,fy,fz,ux,uy,uz\n".to_string();
+    for k in 0..20 {
+        let (s, c) = (f64::from(k) * 0.3).sin_cos();
+        walk += &format!("{k},{},{},1.6,{},{c},0,0,0,1\n", 10.0 + c * 9.0, 10.0 + s * 9.0, -s);
+    }
+    (mesh, walk)
+}

@@ -1,6 +1,7 @@
 //! Real faults, driven through the real program: killed, timed out, out of
 //! memory, interrupted, full, unwritable. Nothing is simulated.
 
+use super::common::town;
 use cullmark::store::{Store, block_on};
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
@@ -14,26 +15,7 @@ struct Town(tempfile::TempDir);
 impl Town {
     fn new(n: usize) -> Town {
         let dir = tempfile::tempdir().unwrap();
-        let (mut mesh, mut base) = (String::new(), 1);
-        for i in 0..n * n {
-            let (x, y, h) = ((i / n) as f64 * 4.0, (i % n) as f64 * 4.0, 1.0 + (i % 5) as f64);
-            for z in [0.0, h] {
-                for (a, b) in [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)] {
-                    mesh += &format!("v {} {} {z}\n", x + a, y + b);
-                }
-            }
-            for [a, b, c, d] in [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
-                .map(|q| q.map(|k| base + k))
-            {
-                mesh += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
-            }
-            base += 8;
-        }
-        let mut walk = "frame,px,py,pz,fx,fy,fz,ux,uy,uz\n".to_string();
-        for k in 0..20 {
-            let (s, c) = (f64::from(k) * 0.3).sin_cos();
-            walk += &format!("{k},{},{},1.6,{},{c},0,0,0,1\n", 10.0 + c * 9.0, 10.0 + s * 9.0, -s);
-        }
+        let (mesh, walk) = town(n);
         let manifest = "[study]\nname = \"town\"\ntitle = \"A town\"\n[measure]\nrepeats = 3\npasses = 1\n\
             timeout_s = 120\n[accuracy]\nframes = 1\nwidth_px = 32\nheight_px = 18\n[[scene]]\nname = \"town\"\n\
             file = \"town.obj\"\nup = \"z\"\n[[path]]\nname = \"walk\"\nfile = \"walk.csv\"\n[matrix]\n\
@@ -304,6 +286,9 @@ fn a_full_disk_is_said_and_what_was_stored_stays() {
         let e = full.expect("the database cannot grow for ever").to_string();
         assert!(e.contains("the disk is full") && e.contains("x.db") && e.contains("compact"), "{e}");
         assert_eq!(store.results("town").await.unwrap().runs.len(), 4);
+        // With room again the same connection goes on, though the error ended its transaction.
+        store.limit_pages(1 << 30).await.unwrap();
+        store.import(&file, Some("one more")).await.unwrap();
     });
 }
 

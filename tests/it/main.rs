@@ -12,6 +12,8 @@ mod preflight;
 mod readers;
 mod report;
 mod scenes;
+mod service;
+mod service_faults;
 mod store;
 mod structures;
 mod tidy;

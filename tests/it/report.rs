@@ -2,6 +2,8 @@
 
 #[path = "report/axes.rs"]
 mod axes;
+#[path = "report/columns.rs"]
+mod columns;
 #[path = "report/fixture.rs"]
 mod fixture;
 #[path = "report/frontier.rs"]

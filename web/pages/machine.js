@@ -139,13 +139,8 @@ export function mount(root, { signal, setTitle }) {
       h(
         "td",
         null,
-        w.study && w.run !== null && w.run !== undefined
-          ? h(
-              "a",
-              { href: `/studies/${segment(w.study)}/runs/${segment(String(w.run))}` },
-              String(w.run).slice(0, 12),
-            )
-          : missing("idle"),
+        // What the run is called; that leads nowhere, hence no link.
+        w.run ? h("code", null, w.run) : missing("idle"),
       ),
       h("td", { class: "nowrap" }, w.since ? instant(w.since) : missing("idle")),
     );
@@ -172,7 +167,7 @@ export function mount(root, { signal, setTitle }) {
           { class: "scroll" },
           h(
             "table",
-            null,
+            { class: "checks" },
             h("caption", { class: "offscreen" }, "Checks of cullmark doctor"),
             h(
               "thead",

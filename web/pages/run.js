@@ -17,14 +17,16 @@ export function mount(root, { params, signal, setTitle }) {
   let watching = false;
   const load = () =>
     guarded(root, "Loading the run", async () => {
-      const [run, catalog] = await Promise.all([
+      const [run, catalog, list] = await Promise.all([
         api.json(path, { signal }),
         metricCatalog().catch(() => new Map()),
+        // Only how many runs there are: the last one has no next.
+        api.json(`/studies/${segment(params.study)}/runs`, { query: { limit: 1, columns: "status" }, signal }),
       ]);
       setTitle(`${run.label} in ${run.scene}`, params.study);
       if (run.status === "pending" && !watching) watch(run);
-      return page(run, catalog);
-    });
+      return page(run, catalog, list.total);
+    }, { heading: "h1" });
   load();
 
   /** A run that is still pending is shown anew once it has ended. */
@@ -41,7 +43,7 @@ export function mount(root, { params, signal, setTitle }) {
   }
 
   /** From the verdict down to where it was measured. */
-  function page(run, catalog) {
+  function page(run, catalog, total) {
     const study = `/studies/${segment(params.study)}`;
     const view = (frame) => `${study}/runs/${run.ordinal}/view${frame === undefined ? "" : `?frame=${frame}`}`;
     const lost = (run.judged_frames || []).filter((f) => f.false_culls > 0);
@@ -67,7 +69,7 @@ export function mount(root, { params, signal, setTitle }) {
           "div",
           { class: "head-tools" },
           run.ordinal > 0 && neighbour(run.ordinal - 1, "‹", "The run before in the matrix"),
-          neighbour(run.ordinal + 1, "›", "The next run in the matrix"),
+          run.ordinal + 1 < total && neighbour(run.ordinal + 1, "›", "The next run in the matrix"),
           h("a", { class: "button primary", href: view(lost[0]?.frame) }, "Frame viewer"),
         ),
       ),
@@ -90,10 +92,13 @@ function banner(run, lost) {
     failed: "The run failed. Its times are withheld.",
     wrong: "The run is wrong for its declared class. Its times are withheld; its errors are its result.",
   };
+  // "Right" beside "lost" needs a word: some classes promise less than others.
+  const allowed =
+    run.status === "done" && lost.length > 0 ? ` A method of the class “${run.class}” may lose triangles.` : "";
   return h(
     "div",
     { class: `banner ${run.status}`, role: "status" },
-    h("p", null, badge(run.status), " ", words[run.status] || ""),
+    h("p", null, badge(run.status), " ", words[run.status] || "", allowed),
     run.reason && h("p", { class: "reason" }, run.reason),
     lost.length > 0 && h("p", null, `Visible triangles were lost in ${count(lost.length, "judged frame")}.`),
     run.stop_reason && h("p", { class: "muted" }, `Measuring stopped: ${run.stop_reason}`),

@@ -3,7 +3,6 @@
 import { h } from "/parts/dom.js";
 import { count, number } from "/parts/format.js";
 import { pairs, valueText } from "/parts/pairs.js";
-import { empty } from "/parts/states.js";
 
 /** All of it is in the study itself; nothing is asked. */
 export async function mount(panel, { detail }) {
@@ -25,7 +24,7 @@ function excluded(cells) {
       "section",
       { class: "card" },
       h("h2", null, "Excluded"),
-      empty("No cell of the matrix is excluded"),
+      h("p", { class: "muted" }, "No cell of the matrix is excluded."),
     );
   const total = cells.reduce((sum, c) => sum + (c.count || 1), 0);
   return h(

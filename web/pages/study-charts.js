@@ -52,6 +52,8 @@ export async function mount(panel, study) {
       }
     };
     watcher.observe(place);
+    // Every value is in the description, for those who cannot see the chart; it begins with the title.
+    const words = (item.description || "").replace(item.title, "").replace(/^[.\s]+/, "");
     const save = (format) =>
       h(
         "button",
@@ -73,12 +75,8 @@ export async function mount(panel, study) {
       h(
         "figcaption",
         null,
-        h("b", null, item.title),
-        ". ",
-        h("span", { class: "muted" }, item.description || ""),
-        " ",
-        save("svg"),
-        save("png"),
+        h("span", { class: "between inline" }, h("b", null, item.title), h("span", null, save("svg"), save("png"))),
+        words && h("details", { class: "in-words" }, h("summary", null, "In words"), h("p", null, words)),
       ),
     );
   }

@@ -6,6 +6,8 @@ import { capital, interval, missing } from "/parts/format.js";
 import { empty, guarded } from "/parts/states.js";
 
 const LIVE_MS = 8000;
+// So many claims fit on a screen with all that was found.
+const FEW = 3;
 // The verdicts as classes of the style sheet; another word is shown as it is.
 const CLASSES = [
   [/contradict/i, "contradicted"],
@@ -34,7 +36,7 @@ export async function mount(panel, { path, signal }) {
       for (const c of items) verdicts.set(c.verdict, (verdicts.get(c.verdict) || 0) + 1);
       return [
         h("p", { class: "muted" }, [...verdicts].map(([v, n]) => `${n} ${v.replace("_", " ")}`).join(", ")),
-        h("ul", { class: "claims" }, items.map(claim)),
+        h("ul", { class: "claims" }, items.map((c) => claim(c, items.length <= FEW))),
       ];
     });
   load();
@@ -46,7 +48,7 @@ export async function mount(panel, { path, signal }) {
 const kindOf = (verdict) => CLASSES.find(([pattern]) => pattern.test(verdict))?.[1] || "undecided";
 
 /** What was stated and found in each scene, or whatever the claim is judged by. */
-function groups(list) {
+function groups(list, open) {
   if (!list?.length) return null;
   const cells = (g) => [
     h("th", { scope: "row" }, g.name || "all"),
@@ -60,7 +62,7 @@ function groups(list) {
   );
   return h(
     "details",
-    { class: "box" },
+    { class: "box", open },
     h("summary", null, `Place by place (${list.length})`),
     h(
       "div",
@@ -81,7 +83,7 @@ function groups(list) {
 }
 
 /** Verdict first, then what was claimed, by whom, and what was found. */
-function claim(c) {
+function claim(c, open) {
   const kind = kindOf(c.verdict);
   return h(
     "li",
@@ -94,6 +96,6 @@ function claim(c) {
       c.source && `, ${c.source}`,
       c.summary && `. ${capital(c.summary)}`,
     ),
-    groups(c.groups),
+    groups(c.groups, open),
   );
 }

@@ -29,6 +29,7 @@ export async function mount(panel, study) {
   };
   // Switched off in the legend; not in the address, since it is a way of looking.
   const off = { culling: new Set(), variant: new Set() };
+  // Names alone would not say what is less and better.
   const catalog = await metricCatalog();
   if (signal.aborted) return null;
   if (!state.x) {
@@ -128,6 +129,7 @@ export async function mount(panel, study) {
   function draw() {
     if (!answer) return;
     hideTip();
+    // All scenes together: a method has the same look in each.
     const labels = answer.scenes.flatMap((s) => s.points.map((p) => p.label));
     if (labels.length === 0 && answer.scenes.every((s) => !s.left_out?.length)) {
       set(legend);
@@ -270,7 +272,10 @@ export async function mount(panel, study) {
   }
 
   load();
-  const live = throttle(() => load({ quiet: true }), LIVE_MS);
+  const live = throttle(async () => {
+    if (!(await study.grown().catch(() => false))) load({ quiet: true });
+    else if (!signal.aborted) study.reopen();
+  }, LIVE_MS);
   return {
     refilter: () => load(),
     live,

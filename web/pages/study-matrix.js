@@ -47,6 +47,7 @@ export async function mount(panel, study) {
   const said = h("p", { class: "offscreen", "aria-live": "polite" });
   const note = h("p", { class: "hint" });
   const legend = h("canvas", { class: "legend-bar", role: "img" });
+  const row = h("div", { class: "legend-row" });
   const map = heatMap({
     label: "Matrix of runs. Arrow keys move, Enter opens the run.",
     onHover,
@@ -162,7 +163,9 @@ export async function mount(panel, study) {
     const turned = state.turn === "auto" ? matrix.columns.length > matrix.rows.length : state.turn === "down";
     data = heatData(matrix, { turned, relative: state.relative });
     const log = state.scale === "auto" ? wantsLog(data.values) : state.scale === "log";
-    if (!map.node.isConnected) set(body, legendRow(), map.node, note);
+    if (!map.node.isConnected) set(body, row, map.node, note);
+    // Counts change while the study runs; the map itself stays, and with it the focus.
+    set(row, legendRow());
     const colours = map.show(data, log);
     drawLegend(colours.domain, log);
     const m = catalog.get(state.metric);
@@ -179,6 +182,9 @@ export async function mount(panel, study) {
       ? "Zeros have the colour of the least value: a logarithm has no place for them."
       : "";
 
+  // What the numbers of map and legend are in.
+  const unitText = () => (state.relative ? "× the best of the scene" : catalog.get(state.metric)?.unit || "no unit");
+
   /** Colours, and the states that have none. */
   function legendRow() {
     const { counts } = data;
@@ -194,14 +200,13 @@ export async function mount(panel, study) {
         ),
         `${text}: ${number(counts[status])}`,
       );
-    return h(
-      "div",
-      { class: "legend-row" },
+    return [
       legend,
+      data.values.some((v) => v !== null) && h("span", { class: "muted" }, unitText()),
       key("pending", "pending"),
       key("failed", "failed"),
       key("wrong", "wrong"),
-    );
+    ];
   }
 
   /** The ramp with ticks on the scale in use. */
@@ -308,7 +313,12 @@ export async function mount(panel, study) {
   watchTheme(onceAFrame(draw), signal);
   load();
   const large = study.detail.runs.total > LARGE;
-  const live = throttle(() => load({ quiet: true }), large ? LATER_MS : SOON_MS);
+  // The first runs bring metrics, and with them a better one to show than what there was.
+  const follow = async () => {
+    if (!(await study.grown().catch(() => false))) load({ quiet: true });
+    else if (!signal.aborted) study.reopen();
+  };
+  const live = throttle(follow, large ? LATER_MS : SOON_MS);
   return {
     refilter: () => load(),
     live,

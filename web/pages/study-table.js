@@ -12,7 +12,10 @@ import { badge } from "/parts/status.js";
 import { virtualTable } from "/parts/virtual.js";
 
 const PAGE = 200;
+// What the server sends at once.
+const MOST = 1000;
 const LIVE_MS = 5000;
+const SELDOM_MS = 20000;
 const DEFAULT = [
   "scene",
   "structure",
@@ -80,6 +83,9 @@ export async function mount(panel, study) {
     ...more,
   });
 
+  const fetchPage = (more, { signal: ours }) =>
+    api.json(`${study.path}/runs`, { query: request(more), signal: AbortSignal.any([signal, ours]) });
+
   /** The first page, or quietly everything seen so far. */
   async function load({ quiet = false } = {}) {
     fetching?.abort();
@@ -87,17 +93,19 @@ export async function mount(panel, study) {
     const mine = fetching;
     if (!quiet) set(place, loading("Loading the runs"));
     try {
-      // While results come in, what has been seen is fetched again, as far as one page goes.
-      const limit = quiet ? Math.min(1000, Math.max(PAGE, items.length)) : PAGE;
-      const page = await api.json(`${study.path}/runs`, {
-        query: request({ limit }),
-        signal: AbortSignal.any([signal, mine.signal]),
-      });
+      // While results come in, what has been seen is fetched again.
+      const limit = quiet ? Math.min(MOST, Math.max(PAGE, items.length)) : PAGE;
+      const page = await fetchPage({ limit }, mine);
+      // A page of the server ends at a thousand; a list that was scrolled further takes several.
+      while (quiet && page.next && page.items.length < items.length) {
+        const further = await fetchPage({ limit: MOST, cursor: page.next }, mine);
+        page.items.push(...further.items);
+        page.next = further.next;
+      }
       study.filterError(null);
       const sameHead =
         table &&
         quiet &&
-        items.length <= limit &&
         page.columns.map((c) => c.name).join() === columns.map((c) => c.name).join();
       ({ columns, items, next, total } = page);
       if (total === 0)
@@ -135,10 +143,7 @@ export async function mount(panel, study) {
     fetching = new AbortController();
     const mine = fetching;
     try {
-      const page = await api.json(`${study.path}/runs`, {
-        query: request({ limit: PAGE, cursor: next }),
-        signal: AbortSignal.any([signal, mine.signal]),
-      });
+      const page = await fetchPage({ limit: PAGE, cursor: next }, mine);
       items = items.concat(page.items);
       next = page.next;
       total = page.total ?? total;
@@ -305,13 +310,15 @@ export async function mount(panel, study) {
   }
 
   load();
+  // Many pages are dear to ask for, so a long list is brought up to date less often.
   const live = throttle(() => load({ quiet: true }), LIVE_MS);
+  const seldom = throttle(() => load({ quiet: true }), SELDOM_MS);
   return {
     refilter: () => load(),
-    // A long list that was scrolled through is left alone: replacing it would lose the place.
-    live: () => items.length <= 1000 && live(),
+    live: () => (items.length > MOST ? seldom() : live()),
     destroy() {
       live.cancel();
+      seldom.cancel();
       fetching?.abort();
     },
   };

@@ -36,7 +36,7 @@ export function mount(root, { params, signal, navigate, setTitle }) {
   const first = guarded(root, "Loading the study", async () => {
     const detail = await api.json(`/studies/${segment(ref)}`, { signal });
     return page(detail);
-  });
+  }, { heading: "h1" });
   first.catch(() => {});
 
   /** Header and tabs; tabs fetch what they need when they are opened. */
@@ -69,8 +69,15 @@ export function mount(root, { params, signal, navigate, setTitle }) {
       where: readQuery().where || "",
       signal,
       filterError: (error) => box.fail(error),
-      async reload() {
+      /** True when runs brought metrics that the study did not have when it was loaded. */
+      async grown() {
+        const known = detail.metrics.length;
         Object.assign(detail, await api.json(path, { signal }));
+        return detail.metrics.length > known;
+      },
+      reopen: () => chooser.reopen(),
+      async reload() {
+        await study.grown();
         chooser.reopen();
       },
     };
@@ -145,7 +152,7 @@ export function mount(root, { params, signal, navigate, setTitle }) {
         .map((r) => [
           " · ",
           `${jobWord(r.kind)} of `,
-          h("a", { href: `/studies/${segment(detail.ref)}/runs/${r.run}` }, String(r.run).slice(0, 8)),
+          h("code", null, r.run),
           hasRepeat(r) ? `, repeat ${r.repeat}` : "",
         ]);
       set(running, summary.finished ? "" : [remaining(summary), now]);

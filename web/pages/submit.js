@@ -70,9 +70,11 @@ export function mount(root, { signal, navigate, setTitle }) {
       number.hidden = series.value !== "n";
       check();
     },
+    // Its label stands for two controls, of which only one is always there.
+    { "aria-label": "Series" },
   );
   const retry = h("input", { type: "checkbox" });
-  const examples = h("select", { "aria-label": "Load an example" }, h("option", { value: "" }, "Examples …"));
+  const examples = h("select", { class: "examples", "aria-label": "Load an example" }, h("option", { value: "" }, "Examples …"));
   const verdict = h("p", { class: "verdict", role: "status" });
   const mistakes = h("div", { class: "mistakes" });
   const preview = h(

@@ -11,6 +11,8 @@ export function mount(root, { params, signal, setTitle }) {
   const isRun = params.run !== undefined;
   const frame = Number.parseInt(readQuery().frame ?? "0", 10) || 0;
   setTitle(isRun ? `Frames of run ${params.run}` : "Scene", params.study);
+  const name = h("code", null, params.upload);
+  if (!isRun) callByName();
   const container = h("div", { class: "viewer-place" }, loading("Loading the viewer"));
   set(
     root,
@@ -34,7 +36,7 @@ export function mount(root, { params, signal, setTitle }) {
                 ),
                 " › frames",
               ]
-            : [h("a", { href: "/scenes" }, "Scenes and paths"), " › ", h("code", null, params.upload)],
+            : [h("a", { href: "/scenes" }, "Scenes and paths"), " › ", name],
         ),
         h("h1", { class: "small" }, isRun ? "Frame viewer" : "Fly through the scene and record a path"),
       ),
@@ -43,6 +45,15 @@ export function mount(root, { params, signal, setTitle }) {
   );
   let viewer = null;
   start();
+
+  /** The address has the upload's id; people know it by its name. */
+  async function callByName() {
+    const { items } = await api.json("/uploads", { signal }).catch(() => ({ items: [] }));
+    const upload = items.find((u) => u.id === params.upload);
+    if (!upload) return;
+    set(name, upload.name);
+    setTitle(upload.name);
+  }
 
   /** Fetches the viewer; the page may have been left before it comes. */
   async function start() {

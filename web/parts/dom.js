@@ -136,3 +136,6 @@ export function button(text, onclick, { why, ...attrs } = {}) {
     text,
   );
 }
+
+/** A name that may go on in the next line after an underscore, and nowhere else. */
+export const breakable = (name) => name.split(/(?<=_)/).map((part, i) => [i ? h("wbr") : null, part]);

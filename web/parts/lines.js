@@ -162,7 +162,13 @@ export function frameCharts({ charts, frames, marks = [], onFrame, signal }) {
       context.lineJoin = "round";
       for (const other of c.others || []) line(other, ys, ink("--c5"), 0.8, 0.45);
       line(c.values, ys, ink("--accent"), 1.5, 1);
+      context.restore();
+      // Not clipped: half of the mark of the first or last frame lies beyond the axis.
       drawMarks(bottom);
+      context.save();
+      context.beginPath();
+      context.rect(LEFT, 0, width - LEFT - RIGHT, HEIGHT);
+      context.clip();
       drawPointer(ys, bottom);
       context.restore();
     });
@@ -233,6 +239,7 @@ export function frameCharts({ charts, frames, marks = [], onFrame, signal }) {
     /** Judged frames on the axis: a tick; a red triangle where something was lost. */
     function drawMarks(bottom) {
       for (const m of marks) {
+        if (m.frame < group.range[0] || m.frame > group.range[1]) continue;
         const x = toX(m.frame);
         context.fillStyle = ink(m.bad ? "--alarm" : "--good");
         if (!m.bad) context.fillRect(x - 0.75, bottom - 5, 1.5, 5);

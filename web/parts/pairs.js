@@ -7,7 +7,7 @@ import { grouped } from "/parts/format.js";
 /** Names and values of any object; objects inside become lists of their own. */
 export function pairs(object) {
   const rows = Object.entries(object).map(([key, value]) => [
-    h("dt", null, key.replaceAll("_", " ")),
+    h("dt", null, nameOf(key)),
     h(
       "dd",
       null,
@@ -18,6 +18,15 @@ export function pairs(object) {
   ]);
   return h("dl", { class: "pairs" }, rows);
 }
+
+// Names of the server end in their unit, as `timeout_s` does.
+const UNITS = { s: "s", ms: "ms", ns: "ns", us: "µs", m: "m", mib: "MiB", deg: "°", px: "px" };
+const nameOf = (key) => {
+  const words = key.split("_");
+  const unit = words.length > 1 && UNITS[words.at(-1)];
+  if (!unit) return words.join(" ");
+  return `${words.slice(0, -1).join(" ")} (${unit})`;
+};
 
 /** Any value as text. */
 export function valueText(value) {

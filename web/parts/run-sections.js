@@ -1,7 +1,7 @@
 // The tables of a run: metrics, judged frames, trials, attempts.
 
 import { KIND_ORDER, kindName } from "/parts/catalog.js";
-import { h } from "/parts/dom.js";
+import { breakable, h } from "/parts/dom.js";
 import { cellNode, duration, instant, missing, number } from "/parts/format.js";
 import { jobWord } from "/parts/status.js";
 
@@ -53,7 +53,7 @@ function metricGroup(kind, group, run, catalog) {
           h(
             "tr",
             null,
-            h("th", { scope: "row", title: catalog.get(n)?.about }, n),
+            h("th", { scope: "row", title: catalog.get(n)?.about }, breakable(n)),
             h("td", { class: "n" }, cellNode(run.metrics[n])),
             h("td", { class: "unit" }, catalog.get(n)?.unit || ""),
           ),
@@ -90,6 +90,7 @@ const NAMES = {
   largest_blob_px: "largest hole",
   lost_ids: "lost triangles",
 };
+// The server names them in the field; a head of a column reads better without.
 const UNITS = { false_cull_pixels: "px", largest_blob_px: "px", covered_pixels: "px", pixels: "px" };
 
 /** Judged frames; those with false culls lead to the frame viewer. */

@@ -62,7 +62,8 @@ export function axis(domain, [from, to], { log = false, pad = 0.04, zero = false
     const room = Math.max(Math.log(high / low) * pad, 0.02);
     [low, high] = [low * Math.exp(-room), high * Math.exp(room)];
   } else {
-    const room = (high - low || Math.abs(high) || 1) * pad;
+    // What never changes gets room for ticks around it.
+    const room = high > low ? (high - low) * pad : pad && (Math.abs(high) / 4 || 1);
     high += room;
     low = zero && low >= 0 && low < high * 0.35 ? 0 : low - room;
   }

@@ -16,11 +16,11 @@ export const empty = (title, ...more) =>
   h("div", { class: "state empty" }, h("p", { class: "state-title" }, title), more);
 
 /** A problem document as people read it: title, detail, help, and the list of mistakes. */
-export function problem(error, retry) {
+export function problem(error, retry, { heading = "p" } = {}) {
   return h(
     "div",
     { class: "state problem", role: "alert" },
-    h("p", { class: "state-title" }, error.title || "Something went wrong"),
+    h(heading, { class: "state-title" }, error.title || "Something went wrong"),
     (error.detail || (!error.title && error.message)) && h("p", null, error.detail || error.message),
     error.help && h("p", { class: "muted" }, error.help),
     error.errors?.length > 0 &&
@@ -64,9 +64,9 @@ export async function fetchPart(load) {
 
 /**
  * Runs `work` and shows its progress in `node`: loading, then what `work` returns, or
- * the problem with a button to try again.
+ * the problem with a button to try again. A whole page that failed has it as its `heading`.
  */
-export async function guarded(node, what, work) {
+export async function guarded(node, what, work, { heading } = {}) {
   set(node, loading(what));
   try {
     const content = await work();
@@ -77,7 +77,7 @@ export async function guarded(node, what, work) {
     if (!error.problem) console.error(error);
     set(
       node,
-      problem(error, () => guarded(node, what, work)),
+      problem(error, () => guarded(node, what, work, { heading }), { heading }),
     );
     return false;
   }

@@ -87,7 +87,10 @@ export function lineNodes(pieces) {
 export function readOnly(text) {
   const pre = document.createElement("pre");
   pre.className = "toml";
+  // Reached with the keyboard, since long lines scroll; and then it needs a name.
   pre.tabIndex = 0;
+  pre.setAttribute("role", "region");
+  pre.setAttribute("aria-label", "Manifest");
   let open = "";
   for (const line of text.replace(/\n$/, "").split("\n")) {
     const row = document.createElement("span");

@@ -87,9 +87,30 @@ export class OrbitCamera {
     this.pitch = -0.75;
     const wide = Math.max(this.hi[0] - this.lo[0], 1e-3) / aspect;
     const tall = Math.max(this.hi[1] - this.lo[1], 1e-3);
-    const half = this.plan ? 0.55 * Math.max(wide, tall) : 0.5 * this.size * Math.max(1, 0.8 / aspect);
-    this.distance = half / Math.tan(this.lens.fovY / 2);
+    const slope = Math.tan(this.lens.fovY / 2);
+    this.distance = (0.55 * Math.max(wide, tall)) / slope;
     this.turned();
+    if (this.plan) return;
+    this.distance = 1.03 * this.distanceToSee(slope * aspect, slope);
+    this.turned();
+  }
+
+  /** So far away that every corner of the scene lies within both slopes of the picture. */
+  distanceToSee(across, upwards) {
+    const { forward, up } = this.pose;
+    const right = cross(forward, up);
+    let distance = this.size * 0.1;
+    for (let corner = 0; corner < 8; corner++) {
+      let [x, y, z] = [0, 0, 0];
+      for (let k = 0; k < 3; k++) {
+        const d = ((corner >> k) & 1 ? this.hi[k] : this.lo[k]) - this.target[k];
+        x += d * right[k];
+        y += d * up[k];
+        z += d * forward[k];
+      }
+      distance = Math.max(distance, Math.abs(x) / across - z, Math.abs(y) / upwards - z);
+    }
+    return distance;
   }
 
   setPlan(plan) {

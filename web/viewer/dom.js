@@ -51,8 +51,9 @@ export function slider(label, { min, max, step, value, say }, oninput) {
   return { input, set, node: el("div", { class: "cmv-slider" }, el("label", { for: id, text: label }), output, input) };
 }
 
-const whole = new Intl.NumberFormat("en");
-export const number = (n) => whole.format(n);
+// As on the other pages: thin spaces between groups of three, four digits together.
+const THIN = "\u202f";
+export const number = (n) => (Math.abs(n) < 1e4 ? String(n) : String(n).replace(/\B(?=(\d{3})+$)/g, THIN));
 
 export function percent(part, of) {
   if (!(of > 0)) return "";

@@ -19,6 +19,7 @@ function swatch(colour) {
 export function viewSection(stage, look, on) {
   const { lo, hi } = stage.scene;
   const group = el("fieldset", { class: "cmv-choices" }, el("legend", { text: "Views" }));
+  // Radio buttons of one name on one page belong together, so every viewer has its own.
   const name = `cmv-layout-${Math.random().toString(36).slice(2)}`;
   for (const [key, text] of [["both", "Both"], ["left", "Camera"], ["right", "Bird's eye"]]) {
     const input = el("input", { type: "radio", name, value: key, checked: key === stage.layout, onchange: () => on.layout(key) });
@@ -38,6 +39,7 @@ export function viewSection(stage, look, on) {
     look.cut = s >= steps ? 1e30 : height(s);
     on.changed();
   });
+  // From walking slowly to crossing a city, each step the same factor.
   const log = (s) => 0.2 * Math.pow(1000, s / 100);
   const speed = slider("Speed of flight", {
     min: 0, max: 100, step: 1, value: Math.round((100 * Math.log(stage.fly.speed / 0.2)) / Math.log(1000)),
@@ -90,6 +92,7 @@ export function triangleSection(look, on) {
     el("div", { class: "cmv-row" }, choose("left", "in the camera"), choose("right", "from above")));
   const update = (frame, triangles) => {
     for (const { state, count, share } of rows) {
+      // Without truth only what was not submitted is known; a dash is not a zero.
       const known = frame && (frame.truth || state === 0);
       count.textContent = known ? number(frame.counts[state]) : "–";
       share.textContent = known ? percent(frame.counts[state], triangles) : "";
@@ -97,6 +100,7 @@ export function triangleSection(look, on) {
     rows[2].row.classList.toggle("cmv-alarm", Boolean(frame?.truth && frame.counts[LOST] > 0));
     if (!frame) return (total.textContent = "");
     const submitted = frame.counts[UNSEEN] + frame.counts[SEEN];
+    // A structure may submit one triangle from several nodes.
     const again = frame.header.submitted > submitted ? `, ${number(frame.header.submitted - submitted)} of them again` : "";
     const over = frame.truth && frame.counts[SEEN] > 0 ? `; ${(submitted / frame.counts[SEEN]).toFixed(2)} for each one seen` : "";
     return (total.textContent = `${number(submitted)} of ${number(triangles)} submitted (${percent(submitted, triangles)})${again}${over}`);
@@ -106,6 +110,7 @@ export function triangleSection(look, on) {
 
 /** Decisions at the nodes: legend, numbers and which boxes are drawn. */
 export function nodeSection(nodes, tests, look, on) {
+  // Culled boxes first: they are what a method does.
   const shown = new Uint8Array(256).fill(1, FIRST_CULLED);
   const depths = { least: 0, most: nodes.deepest };
   const bytes = [DRAWN, WENT_ON, ...tests.map((_, k) => FIRST_CULLED + k), NOT_REACHED];
@@ -137,7 +142,8 @@ export function nodeSection(nodes, tests, look, on) {
   }).node;
   const total = el("p", { class: "cmv-note" });
   const node = section("Nodes of the structure", el("table", { class: "cmv-legend" }, el("tbody", {}, ...rows.map((r) => r.row))), total,
-    least.node, most.node, option("Boxes also in the camera's view", "boxesInCamera"), option("Faces of the boxes", "faces"),
+    // All nodes of a list lie at one depth: nothing to choose from.
+    ...(nodes.deepest > 0 ? [least.node, most.node] : []), option("Boxes also in the camera's view", "boxesInCamera"), option("Faces of the boxes", "faces"),
     option("Edges through walls", "through"));
   const update = (frame) => {
     for (const { byte, count, share } of rows) {

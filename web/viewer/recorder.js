@@ -6,8 +6,10 @@ import { clamp } from "./math.js";
 import { pathSegments } from "./plan.js";
 import { clonePose, csv, interpolate, pathLength, placementOf, Sampler } from "./poses.js";
 
+// More than two hours at thirty a second: a key that was forgotten, not a path.
 const MOST_FRAMES = 200_000;
 const MOST_BETWEEN = 10_000;
+// The line behind the flight grows in steps: sending it to the GPU each time would be felt.
 const REDRAW_EVERY = 6;
 const LINE_STATE = "cmv-recording";
 
@@ -28,6 +30,7 @@ export class Recorder {
   build() {
     this.recordButton = button("● Record", () => this.toggle(), { title: "Records the flight, and stops (R)", "aria-pressed": "false" });
     const rate = select("Poses a second", [[30, "30 poses / s"], [60, "60 poses / s"]], 30, (h) => (this.hertz = Number(h)));
+    // Changing it spaces the key poses anew, so that one can try what looks right.
     const gap = el("input", { type: "number", min: 1, max: MOST_BETWEEN, step: 1, value: this.gap, class: "cmv-entry" });
     gap.addEventListener("change", () => {
       this.gap = clamp(Math.round(Number(gap.value)) || 1, 1, MOST_BETWEEN);
@@ -71,6 +74,7 @@ export class Recorder {
   }
 
   set(poses, keys) {
+    // Key poses multiply: refused before they are made part of the path.
     if (poses.length > MOST_FRAMES) {
       this.say(`A path of ${number(poses.length)} frames is too long: ${number(MOST_FRAMES)} at most`);
       return;
@@ -94,11 +98,12 @@ export class Recorder {
     this.stage.invalidate();
     const of = keys.length ? ` from ${keys.length} key pose${keys.length > 1 ? "s" : ""}` : "";
     this.info.textContent = poses.length
-      ? `${number(poses.length)} frames${of}, ${pathLength(poses).toFixed(1)} m, ${(poses.length / this.hertz).toFixed(1)} s at ${this.hertz} a second`
+      ? `${number(poses.length)} frame${poses.length > 1 ? "s" : ""}${of}, ${pathLength(poses).toFixed(1)} m, ${(poses.length / this.hertz).toFixed(1)} s at ${this.hertz} a second`
       : "No path yet: fly and record, or place key poses.";
     this.buttons();
   }
 
+  /** What cannot be done now is disabled: nothing to save, nothing to undo. */
   buttons() {
     const none = this.poses.length === 0 || Boolean(this.sampler);
     for (const b of [this.previewButton, this.saveButton, this.uploadButton, this.clearButton]) b.disabled = none;
@@ -128,12 +133,14 @@ export class Recorder {
       return;
     }
     this.ready();
+    // A recording replaces the path; undo brings the old one back.
     this.history.push([this.poses, this.keys]);
     const sampler = new Sampler(this.hertz);
     this.sampler = sampler;
     this.keys = [];
     this.ticker = (now) => {
       sampler.take(now, stage.pose);
+      // Full: what there is is kept.
       if (sampler.poses.length >= MOST_FRAMES) this.toggle();
       if (sampler.poses.length - this.drawn >= REDRAW_EVERY || sampler.poses.length < this.drawn) {
         this.poses = sampler.poses;
@@ -156,6 +163,7 @@ export class Recorder {
     this.say(`Key pose ${keys.length} placed`);
   }
 
+  /** Flies the camera along the path at the pace at which it was recorded. */
   preview(on) {
     if (Boolean(this.previewing) === on) return;
     const { stage } = this;
@@ -178,6 +186,7 @@ export class Recorder {
     this.buttons();
   }
 
+  /** The typed name as that of a file: no folders, and the ending that the server goes by. */
   get name() {
     const typed = this.nameEntry.value.trim().replace(/[/\\]/g, "-") || "walk";
     return typed.endsWith(".csv") ? typed : `${typed}.csv`;
@@ -210,6 +219,7 @@ export class Recorder {
     this.buttons();
   }
 
+  /** What to write into a manifest, ready to be copied. */
   uploaded(upload) {
     const reference = el("input", { type: "text", readonly: true, value: upload.reference, "aria-label": "Reference of the path", class: "cmv-name" });
     reference.addEventListener("focus", () => reference.select());

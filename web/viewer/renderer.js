@@ -11,6 +11,7 @@ import { LINE, MESH, PLAIN } from "./shaders.js";
 const TRIANGLES_A_BUFFER = 2_000_000;
 // More rings than this would only hide the picture; the triangles themselves all show.
 const MOST_RINGS = 4000;
+// Each is drawn three times more; beyond this the pass would stall the page.
 const MOST_LOST = 200_000;
 const ONE = new Float32Array(3);
 
@@ -19,6 +20,7 @@ export class Renderer {
     this.gl = gl;
     this.mesh = null;
     this.frame = null;
+    // Kept on this side too: a new context starts empty.
     this.lineData = new Map();
     this.lost = { triangles: new Float32Array(0), edges: new Float32Array(0), centres: new Float32Array(0), count: 0 };
     this.boxes = new Boxes();
@@ -74,6 +76,7 @@ export class Renderer {
       gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
       this.chunks.push({ vao, base, count });
     }
+    // Asked once here: in every frame it would wait for the GPU.
     if (gl.getError() === gl.OUT_OF_MEMORY) throw new Error("The scene does not fit into the memory of the graphics card");
     this.states = new PerTriangle(gl, triangles, "bytes");
     this.colours = new PerTriangle(gl, triangles, "words");
@@ -95,6 +98,7 @@ export class Renderer {
     lost.count = count;
     lost.rings = Math.min(count, MOST_RINGS);
     if (count === 0) return;
+    // Twice what is needed, so that stepping through frames seldom asks for memory.
     if (lost.centres.length < 3 * count) {
       lost.triangles = new Float32Array(9 * count * 2);
       lost.edges = new Float32Array(18 * count * 2);
@@ -142,6 +146,7 @@ export class Renderer {
   draw(panes, look) {
     const { gl } = this;
     if (gl.isContextLost()) return;
+    // The bars beside a measured camera first: panes clear their own part only.
     gl.disable(gl.SCISSOR_TEST);
     gl.clearColor(look.margin[0], look.margin[1], look.margin[2], 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
@@ -163,6 +168,7 @@ export class Renderer {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     if (this.chunks) this.drawMesh(pane, look, false);
     gl.enable(gl.BLEND);
+    // Ghosts and boxes let through what lies behind, so they do not hide each other.
     gl.depthMask(false);
     if (this.chunks && this.frame && pane.unsubmitted === 1) this.drawMesh(pane, look, true);
     if (pane.boxes) this.boxes.draw(pane, look);
@@ -181,6 +187,7 @@ export class Renderer {
     gl.uniform1i(at.uStates, 0);
     gl.uniform1i(at.uColours, 1);
     gl.uniform1i(at.uStated, this.frame ? 1 : 0);
+    // Without truth nobody looked: submitted triangles have one colour then.
     gl.uniform1i(at.uTruth, this.frame && this.frame.truth ? 1 : 0);
     gl.uniform1i(at.uGhosts, ghosts ? 1 : 0);
     gl.uniform1i(at.uUnsubmitted, pane.unsubmitted);
@@ -194,6 +201,7 @@ export class Renderer {
     // Discarding in the shader costs early depth tests: only where sides are mixed.
     const mixed = mesh.twoSided > 0 && mesh.twoSided < mesh.triangles;
     gl.uniform1i(at.uDiscardBacks, mixed && !pane.backs ? 1 : 0);
+    // The cheap way where all triangles have one side.
     if (mesh.twoSided === 0 && !pane.backs) gl.enable(gl.CULL_FACE);
     for (let i = 0; i < this.chunks.length; i++) {
       const { vao, base, count } = this.chunks[i];
@@ -228,6 +236,7 @@ export class Renderer {
     gl.uniform4fv(at.uAfter, after);
     gl.bindVertexArray(line.vao);
     gl.disable(gl.DEPTH_TEST);
+    // Through walls one sees where the path goes on.
     gl.uniform1f(at.uAlpha, 0.35);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, line.count);
     gl.enable(gl.DEPTH_TEST);
@@ -235,6 +244,7 @@ export class Renderer {
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, line.count);
   }
 
+  /** Where the camera is, as a disc of one size at any distance. */
   drawMark(pane, look) {
     const { gl, mark } = this;
     ONE[0] = pane.marked[0];
@@ -250,6 +260,7 @@ export class Renderer {
     gl.enable(gl.DEPTH_TEST);
   }
 
+  /** Over everything: a lost triangle behind a wall of others is still an error to be found. */
   drawLost(pane, look) {
     const { gl, lost, lostBuffers } = this;
     const at = this.plain(pane, look.lostFill, look.rim);
@@ -263,6 +274,7 @@ export class Renderer {
     gl.drawArrays(gl.LINES, 0, 6 * lost.count);
     gl.uniform1i(at.uShape, 1);
     gl.uniform1f(at.uPointSize, 14 * pane.ratio);
+    // Rings, since a lost triangle may be smaller than a pixel.
     gl.bindVertexArray(lostBuffers.centres.vao);
     gl.drawArrays(gl.POINTS, 0, lost.rings);
     gl.enable(gl.DEPTH_TEST);

@@ -9,10 +9,14 @@ import { clamp, viewProjection } from "./math.js";
 import { frustumData, frustumSegments, pathSegments } from "./plan.js";
 import { Renderer } from "./renderer.js";
 
+// For scenes that no run has a camera for.
 const DEFAULT_FOV = Math.PI / 3;
+// Higher than any scene: nothing is cut off. Infinity is no number for a shader.
 const NOWHERE = 1e30;
 const PANS = ["KeyW", "KeyA", "KeyS", "KeyD"];
+// A tab that comes back after a minute must not fly on for a minute.
 const LONGEST_STEP_S = 0.1;
+// Beyond two pixels a point nobody sees a difference, but the GPU has twice the work.
 const MOST_PIXELS_A_POINT = 2;
 
 const newPane = () => ({
@@ -81,6 +85,7 @@ export class Stage {
     const gl = context(this.canvas);
     if (!gl) throw new Error("This browser offers no WebGL2, which the viewer draws with");
     this.renderer = new Renderer(gl);
+    // Without preventDefault the browser never gives the context back.
     this.canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
       this.on.lost();
@@ -106,6 +111,7 @@ export class Stage {
     pointers(this.leftPane, {
       drag: touch((dx, dy, second) => {
         this.takeOff();
+        // Shifting goes with the speed of flight, which the reader has chosen for the scene's size.
         const metres = this.fly.speed * 0.004;
         if (second) this.fly.move(0, -dx * metres, dy * metres);
         else this.fly.look(dx, dy, this.left.height / this.left.ratio);
@@ -122,6 +128,7 @@ export class Stage {
     }, signal);
     pointers(this.rightPane, {
       drag: touch((dx, dy, second) => {
+        // A plan has nothing to turn to: there the plain drag moves.
         const pan = this.orbit.plan ? !second : second;
         if (pan) this.pan(dx, dy);
         else this.orbit.orbit(dx, this.orbit.plan ? 0 : dy);
@@ -135,6 +142,7 @@ export class Stage {
   }
 
   pan(dx, dy) {
+    // Who moves the view wants it to stay there.
     this.setFollow(false);
     this.orbit.pan(dx, dy, this.right.height / this.right.ratio);
   }
@@ -145,6 +153,7 @@ export class Stage {
   }
 
   setLeftMode(mode) {
+    // Flight begins where the measured camera stands.
     if (mode === "fly" && this.leftMode !== "fly") this.fly.setPose(this.measured);
     this.leftMode = mode;
     this.leftSelect.value = mode;
@@ -156,6 +165,7 @@ export class Stage {
     this.layout = layout;
     this.leftPane.hidden = layout === "right";
     this.rightPane.hidden = layout === "left";
+    // Keys go to the pane that is left.
     this.active = layout === "right" ? "right" : "left";
     this.resize();
   }
@@ -215,6 +225,7 @@ export class Stage {
     place(this.left, 0, height - h, w, h, aspect);
     place(this.right, width - w, 0, w, h, 0);
     this.panes = this.layout === "left" ? [this.left] : this.layout === "right" ? [this.right] : [this.left, this.right];
+    // Only now is it known how wide the pane is; later sizes leave the view alone.
     if (!this.fitted && width > 1) {
       this.fitted = true;
       this.orbit.fit(this.right.aspect);
@@ -241,11 +252,13 @@ export class Stage {
     if (busy) this.dirty = true;
     for (const ticker of this.tickers) busy = ticker(now, seconds) || busy;
     if (this.dirty) this.draw();
+    // After a rest the next step starts at 0 s, not at the length of the rest.
     this.before = busy ? now : undefined;
     if (busy) this.schedule();
   }
 
   steerByKeys(seconds) {
+    // Shift alone moves nothing.
     if (this.keys.codes.size === (this.keys.has("Shift") ? 1 : 0)) return false;
     if (this.active === "right") {
       this.orbit.step(this.keys, seconds);
@@ -284,6 +297,7 @@ export class Stage {
     paint(lines.frustum.after, look.ink, 1);
     paint(lines.fly.after, look.accent, 1);
     paint(lines.record.after, look.recordColour, 1);
+    // The same arrays every time: drawing makes no garbage.
     left.lines.length = right.lines.length = 0;
     if (scene.measured) {
       const reach = look.reach * this.size;
@@ -292,6 +306,7 @@ export class Stage {
       if (flying) left.lines.push(lines.path, lines.frustum);
     }
     if (flying) {
+      // A hidden left pane has no aspect of its own.
       const aspect = this.layout === "both" ? left.aspect : 1.5;
       renderer.setLines("fly", this.flyFrustum, frustumSegments(this.flyFrustum, this.fly.pose, this.fly.lens, aspect, 0.04 * this.size));
       right.lines.push(lines.fly);
@@ -341,6 +356,7 @@ export class Stage {
     cancelAnimationFrame(this.request);
     this.abort.abort();
     this.resizer.disconnect();
+    // Browsers allow few contexts: this one is given back now, not when the garbage is collected.
     this.renderer.gl.getExtension("WEBGL_lose_context")?.loseContext();
     this.node.remove();
   }

@@ -5,6 +5,7 @@ import { button, el, number, select } from "./dom.js";
 import { clamp } from "./math.js";
 
 const CHART_HEIGHT = 52;
+// The first and last frame stand clear of the edge.
 const MARGIN_PX = 4;
 
 /** `on`: `go(n)`, `play(playing)`, `loss()`. */
@@ -41,6 +42,7 @@ export class Timeline {
       const t = (event.clientX - box.left - MARGIN_PX) / Math.max(box.width - 2 * MARGIN_PX, 1);
       this.go(Math.round(t * (frames - 1)));
     };
+    // Captured, so that a drag may leave the narrow strip.
     strip.addEventListener("pointerdown", (event) => {
       strip.setPointerCapture(event.pointerId);
       seek(event);
@@ -54,6 +56,7 @@ export class Timeline {
         el("label", { class: "cmv-inline" }, el("span", { text: "Frame" }), this.entry, el("span", { text: `of ${number(frames)}, from 0` })),
         this.lossButton),
       this.slider, strip, this.caption);
+    // Where nothing was judged nothing is known of losses; the title says so.
     this.lossButton.disabled = this.judged.length === 0;
     if (this.judged.length === 0) this.lossButton.title = "No frame of this run was judged";
     this.observer = new ResizeObserver(() => this.paint());
@@ -61,6 +64,7 @@ export class Timeline {
   }
 
   go(n) {
+    // An emptied box is no frame: it shows the current one again.
     if (!Number.isFinite(n)) return this.show(this.current);
     const frame = clamp(Math.round(n), 0, this.frames - 1);
     this.show(frame);
@@ -81,6 +85,7 @@ export class Timeline {
     this.playing = playing;
     this.playButton.textContent = playing ? "❚❚" : "▶";
     this.playButton.setAttribute("aria-label", playing ? "Pause" : "Play");
+    // From the end it begins anew, as players do.
     if (playing && this.current >= this.frames - 1) this.go(0);
     this.on.play(playing);
   }
@@ -88,6 +93,7 @@ export class Timeline {
   /** `[{name, unit, values}]`, one value a frame. */
   setSeries(series) {
     this.series = series.filter((s) => Array.isArray(s.values) && s.values.length > 0);
+    // A strip with nothing on it would look broken.
     this.strip.hidden = this.series.length === 0 && this.judged.length === 0;
     this.paint();
     this.caption.textContent = this.said();
@@ -105,7 +111,7 @@ export class Timeline {
       .map(({ name, unit, values }, i) => {
         const value = values[this.current];
         if (value === null || value === undefined) return "";
-        const text = unit === "ns" && value >= 1000 ? `${(value / 1000).toFixed(1)} µs` : `${number(value)} ${unit ?? ""}`;
+        const text = unit === "ns" && value >= 1000 ? `${(value / 1000).toFixed(1)} µs` : `${number(value)}${unit && unit !== name ? ` ${unit}` : ""}`;
         return `${i === 0 ? "━" : "┅"} ${name.replace(/_ns$/, "").replace(/_/g, " ")}: ${text}`;
       })
       .filter(Boolean)
@@ -149,6 +155,7 @@ export class Timeline {
 
   /** Least to most of every column of pixels, so that no peak is lost in thousands of frames. */
   curve(pen, values, colour, dashed, foot) {
+    // From zero, so that heights can be compared; the caption has the numbers.
     let most = 0;
     for (const v of values) if (v > most) most = v;
     if (most === 0) return;

@@ -13,6 +13,7 @@ import { Recorder } from "./recorder.js";
 import { Stage } from "./stage.js";
 import { Timeline } from "./timeline.js";
 
+// Few numbers: the strip is for finding frames, the run's page for reading them.
 const SERIES = "triangles,cull_ns";
 const segment = (text) => encodeURIComponent(text).replace(/%40/g, "@");
 
@@ -92,10 +93,12 @@ class Viewer {
     const lo = view.lo ?? [0, 0, 0];
     const hi = view.hi ?? [1, 1, 1];
     const poses = view.poses ?? [];
+    // A frame without a pose could not be drawn.
     this.frames = this.options.kind === "run" ? Math.min(view.frames ?? poses.length, poses.length) : 0;
     const lens = lensOf(view.camera, Math.hypot(...hi.map((h, k) => h - lo[k])) + 1);
     const measured = this.frames > 0 && lens !== null;
     this.look = newLook(mesh.triangles);
+    // Nothing was submitted in a scene without frames, so nothing is pale in it.
     if (!measured) this.look.pale[3] = 0;
     this.stage = new Stage({ lo, hi, lens, aspect: view.camera?.aspect ?? 1.5, poses, measured }, this.look, {
       lost: () => this.say("The graphics card was taken away; waiting for it to come back …"),
@@ -131,6 +134,7 @@ class Viewer {
       main.append(this.timeline.node);
     }
     side.append(viewPanel.node, this.recorder.node, keySection(this.frames > 0));
+    // Without frames recording is what one comes for.
     if (this.frames === 0) this.recorder.node.open = true;
     this.body.replaceChildren(main, side);
     this.stage.renderer.setMesh(mesh);
@@ -158,7 +162,7 @@ class Viewer {
     const { triangles } = this.mesh;
     this.say(triangles > 0 ? `${number(triangles)} triangles` : "The scene has no triangles");
     this.stage.draw();
-    window.__viewer = { ready: true, frame: null, counts: { triangles }, stage: this.stage };
+    window.__viewer = { ready: true, frame: null, counts: { triangles }, stage: this.stage, recorder: this.recorder };
   }
 
   begin() {
@@ -189,6 +193,7 @@ class Viewer {
       quietly(api.json(paths.run, options)),
     ]);
     if (this.abort.signal.aborted) return;
+    // The server may answer in another order, and with fewer.
     const order = SERIES.split(",");
     const known = (series?.series ?? []).filter((s) => order.includes(s.name));
     timeline.setSeries(known.sort((a, b) => order.indexOf(a.name) - order.indexOf(b.name)));
@@ -216,6 +221,7 @@ class Viewer {
     this.errors.replaceChildren();
     if (frame.truth) this.timeline.setLoss(n, frame.counts[LOST]);
     this.summary();
+    // On the way to the truth nothing is complete yet.
     if (frame.truth || frame.asked) this.complete();
   }
 
@@ -257,6 +263,7 @@ class Viewer {
       },
       timings: { upload_ms: this.uploadMs },
       stage: this.stage,
+      recorder: this.recorder,
     };
   }
 
@@ -265,6 +272,7 @@ class Viewer {
   }
 
   /** The address names the frame, so that it can be sent to somebody. */
+  // Replaced, not pushed: a hundred frames must not be a hundred steps back.
   address(n) {
     const url = new URL(location.href);
     url.searchParams.set("frame", n);
@@ -297,6 +305,7 @@ class Viewer {
   async nextLoss() {
     const { timeline } = this;
     const { judged, losses, current } = timeline;
+    // A second press while one search is under way would only ask twice.
     if (this.searching || judged.length === 0) return;
     this.searching = true;
     timeline.lossButton.disabled = true;
@@ -321,6 +330,7 @@ class Viewer {
   }
 
   frameFailed(n, error) {
+    // A film stops at the first frame that is missing.
     if (this.player) this.timeline.play(false);
     const again = el("button", { type: "button", text: "Try again", onclick: () => {
       this.errors.replaceChildren();
@@ -342,7 +352,12 @@ class Viewer {
   fail(error) {
     if (this.abort.signal.aborted) return;
     this.busy.textContent = "";
-    this.errors.replaceChildren(el("p", { class: "cmv-error", text: explain(error) }));
+    // Nothing is shown yet that could be lost by beginning anew.
+    const again = el("button", { type: "button", text: "Try again", onclick: () => {
+      this.errors.replaceChildren();
+      this.start().catch((next) => this.fail(next));
+    } });
+    this.errors.replaceChildren(el("p", { class: "cmv-error", text: explain(error) }), this.stage ? "" : again);
   }
 
   destroy() {

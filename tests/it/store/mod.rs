@@ -3,6 +3,9 @@
 
 mod figures;
 mod fixture;
+mod migrations;
+mod pool;
+mod shared;
 mod sweeps;
 
 use cullmark::culling::Class;
