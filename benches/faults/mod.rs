@@ -75,7 +75,7 @@ pub struct Report {
 }
 
 /// Mean time between kills at least: a job whose worker was lost five times is given up, by design.
-const GAP_S: f64 = 0.25;
+const GAP_S: f64 = 0.2;
 /// The study must end so long after the last fault.
 const PATIENCE: Duration = Duration::from_secs(240);
 /// After trouble that is over, so long nobody is killed: does everyone work again?
@@ -105,10 +105,10 @@ pub fn run(plan: &Plan) -> Report {
         if crew.tally.kills() >= plan.kills {
             continue;
         }
-        // As many of the kills as of nine tenths of the work: the machine's pace changes.
+        // As many of the kills as of eight tenths of the work: the machine's pace changes.
         let done = 1.0 - crew.left().min(jobs) as f64 / jobs as f64;
-        let behind = (crew.tally.kills() as f64) < plan.kills as f64 * (done / 0.9).min(1.0);
-        let gap_s = if behind { GAP_S } else { GAP_S.max(1.2 * calm_s / plan.kills as f64) };
+        let behind = (crew.tally.kills() as f64) < plan.kills as f64 * (done / 0.8).min(1.0);
+        let gap_s = if behind { GAP_S } else { GAP_S.max(0.9 * calm_s / plan.kills as f64) };
         crew.pass(Duration::from_secs_f64(2.0 * gap_s * real(&mut rng)));
         if crew.finished() {
             break;

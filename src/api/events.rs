@@ -139,6 +139,17 @@ async fn stopping(phase: &mut tokio::sync::watch::Receiver<Phase>) {
     let _ = phase.wait_for(|p| *p != Phase::Work).await;
 }
 
+/// The runs that ended since the last look.
+async fn tell_runs(app: &App, study_id: i64, sender: &broadcast::Sender<Bytes>, ended: &Mutex<Vec<Ended>>) {
+    let told: Vec<Ended> = std::mem::take(&mut *ended.lock().unwrap_or_else(PoisonError::into_inner));
+    for run in told {
+        let ordinal = app.store.ordinal_of(study_id, &run.measurement_id).await.ok().flatten();
+        let data = json!({ "ordinal": ordinal, "run": run.measurement_id, "label": run.label,
+                           "status": run.status, "reason": run.reason });
+        let _ = sender.send(message("run", &data));
+    }
+}
+
 async fn publish(
     app: Shared,
     study_id: i64,
@@ -147,8 +158,8 @@ async fn publish(
     ended: Arc<Mutex<Vec<Ended>>>,
 ) {
     let mut last = Bytes::new();
-    // Those who come to a finished study are told so at once.
-    let mut was_finished = progress(&app, study_id).await.is_ok_and(|(_, finished)| finished);
+    // A study that is finished already is told so twice: better than never, had it ended just now.
+    let mut was_finished = false;
     let mut phase = app.phase.clone();
     let mut took = Duration::ZERO;
     loop {
@@ -161,13 +172,7 @@ async fn publish(
                 return;
             }
         }
-        let told: Vec<Ended> = std::mem::take(&mut *ended.lock().unwrap_or_else(PoisonError::into_inner));
-        for run in told {
-            let ordinal = app.store.ordinal_of(study_id, &run.measurement_id).await.ok().flatten();
-            let data = json!({ "ordinal": ordinal, "run": run.measurement_id, "label": run.label,
-                               "status": run.status, "reason": run.reason });
-            let _ = sender.send(message("run", &data));
-        }
+        tell_runs(&app, study_id, &sender, &ended).await;
         let start = Instant::now();
         let state = progress(&app, study_id).await;
         took = start.elapsed();
@@ -178,6 +183,9 @@ async fn publish(
                     last = now;
                 }
                 if finished && !was_finished {
+                    // Who settled the last run is about to say so.
+                    tokio::time::sleep(JOIN).await;
+                    tell_runs(&app, study_id, &sender, &ended).await;
                     let _ = sender.send(message("end", &json!({})));
                 }
                 was_finished = finished;

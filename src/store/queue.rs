@@ -19,6 +19,10 @@ const LOST_LIMIT: i64 = 5;
 /// system's memory killer), two are its own.
 const CRASH_LIMIT: i64 = 2;
 
+/// The same where somebody killed it: an operator, or the system's memory killer, who may
+/// have taken it for another's hunger more than once.
+const KILLED_LIMIT: i64 = 4;
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -82,6 +86,10 @@ pub enum Accepted {
 /// Since the job was last queued anew: `attempts` then began at nought, epochs never do.
 const CRASHES: &str = "SELECT count(*) FROM attempts a JOIN jobs j ON j.id = a.job_id \
     WHERE a.job_id = $1 AND a.outcome = 'crashed' AND a.epoch > j.epoch - j.attempts";
+
+/// The same of attempts lost: a crash of the child is none.
+const LOSSES: &str = "SELECT count(*) FROM attempts a JOIN jobs j ON j.id = a.job_id \
+    WHERE a.job_id = $1 AND a.outcome = 'lost' AND a.epoch > j.epoch - j.attempts";
 
 impl Store {
     /// Renews a lease. False when it has passed to another: stop the work.
@@ -160,7 +168,8 @@ impl Store {
         let mut tx = self.begin("a failure").await?;
         let (crashes,): (i64,) =
             sqlx::query_as(CRASHES).bind(lease.job.id).fetch_one(&mut *tx).await.map_err(explain)?;
-        let last = name != "crashed" || crashes + 1 >= CRASH_LIMIT;
+        let limit = if reason.contains("SIGKILL") { KILLED_LIMIT } else { CRASH_LIMIT };
+        let last = name != "crashed" || crashes + 1 >= limit;
         let reason = if name == "crashed" && last {
             format!("{reason} (attempt {} of it)", crashes + 1)
         } else {
@@ -231,13 +240,15 @@ pub(super) async fn reap(tx: &mut Transaction<'_, Sqlite>) -> sqlx::Result<u64> 
         .bind(now_ms())
         .execute(&mut **tx)
         .await?;
+        let lost: i64 = sqlx::query_scalar(LOSSES).bind(id).fetch_one(&mut **tx).await?;
         sqlx::query(
-            "UPDATE jobs SET state = CASE WHEN attempts >= $2 THEN 'failed' ELSE 'queued' END, \
-             reason = CASE WHEN attempts >= $2 THEN 'its worker was lost ' || attempts || ' times' ELSE reason END, \
+            "UPDATE jobs SET state = CASE WHEN $3 >= $2 THEN 'failed' ELSE 'queued' END, \
+             reason = CASE WHEN $3 >= $2 THEN 'its worker was lost ' || $3 || ' times' ELSE reason END, \
              owner = NULL WHERE id = $1",
         )
         .bind(id)
         .bind(LOST_LIMIT)
+        .bind(lost)
         .execute(&mut **tx)
         .await?;
     }

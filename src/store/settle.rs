@@ -23,6 +23,8 @@ pub struct Settled {
     pub repeats: u32,
     /// Trials queued because the interval is still wide or a repeat was disturbed.
     pub trials_added: u32,
+    /// The status is another than before: of several who decide at once, one tells.
+    pub news: bool,
     /// Trials no longer needed because the run failed or is wrong.
     pub trials_cancelled: u32,
 }
@@ -34,6 +36,7 @@ impl Settled {
         stop_reason: None,
         repeats: 0,
         trials_added: 0,
+        news: false,
         trials_cancelled: 0,
     };
 }
@@ -58,6 +61,12 @@ impl Store {
         let mut tx = self.begin("a decision").await?;
         let policy = self.strictest(&mut tx, measurement_id, policy).await?;
         let mut settled = self.decide(&mut tx, study_id, measurement_id, &policy).await?;
+        let before: Option<String> = sqlx::query_scalar("SELECT status FROM measurements WHERE measurement_id = $1")
+            .bind(measurement_id)
+            .fetch_optional(&mut *tx)
+            .await
+            .map_err(explain)?;
+        settled.news = before.is_some_and(|status| status != word(settled.status));
         settled.trials_cancelled = write(&mut tx, measurement_id, &settled).await.map_err(explain)?;
         tx.commit().await.map_err(explain)?;
         Ok(settled)
@@ -337,13 +346,17 @@ async fn failed_job(
     }))
 }
 
-async fn write(tx: &mut Transaction<'_, Sqlite>, measurement_id: &str, s: &Settled) -> sqlx::Result<u32> {
-    let status = match s.status {
+fn word(status: RunStatus) -> &'static str {
+    match status {
         RunStatus::Pending => "pending",
         RunStatus::Done => "done",
         RunStatus::Failed => "failed",
         RunStatus::Wrong => "wrong",
-    };
+    }
+}
+
+async fn write(tx: &mut Transaction<'_, Sqlite>, measurement_id: &str, s: &Settled) -> sqlx::Result<u32> {
+    let status = word(s.status);
     let finished = (s.status != RunStatus::Pending).then(now_ms);
     // What stays open looks to readers as it did.
     let changed = if s.status == RunStatus::Pending { None } else { Some(changes::tick(tx).await?) };

@@ -356,7 +356,7 @@ impl Crew {
     async fn settle(&self, study_id: i64, measurement_id: &str, run: &str, policy: &RepeatPolicy) -> Result<Settled> {
         let settled = self.store.settle(study_id, measurement_id, policy).await?;
         self.count_off(Kind::Trial, i64::from(settled.trials_added) - i64::from(settled.trials_cancelled));
-        if settled.status != RunStatus::Pending {
+        if settled.news && settled.status != RunStatus::Pending {
             (self.tell)(Event::RunEnded {
                 study_id,
                 measurement_id: measurement_id.to_string(),

@@ -10,7 +10,7 @@ use std::time::Duration;
 fn kills_a_full_disk_and_a_locked_database_lose_nothing() {
     let plan = study::Plan {
         kills: 6,
-        runs: 28,
+        runs: 24,
         repeats: 1,
         full: 1,
         locks: 1,
