@@ -114,7 +114,7 @@ pub fn run(plan: &Plan) -> Report {
             break;
         }
         let mut role = Role::any(&mut rng);
-        // A job whose child crashed twice is taken to be at fault itself, by design, whatever was in between.
+        // A job whose child died again and again is taken to be at fault itself, by design: one at a time.
         if role == Role::Child && wrongs::is_a_crash_open(&lab) {
             role = if rng.next_u32() % 2 == 0 { Role::Server } else { Role::Worker };
         }
