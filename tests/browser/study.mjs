@@ -176,12 +176,12 @@ export async function compareSteps(page, address) {
     await page.getByRole("link", { name: "Compare…" }).click();
     await page.getByLabel("Second", { exact: true }).selectOption("tiny@0");
     await page.getByRole("button", { name: "Exchange first and second" }).click();
-    await page.locator(".rows tbody tr[data-index]").first().waitFor();
+    await page.locator(".rows tbody tr[data-index]").nth(14).waitFor();
     check(/first=tiny(@|%40)0&second=tiny(@|%40)1/.test(page.url()), "the address names both", page.url());
     const { pairs, counts } = await ask(page, "/compare?first=tiny@0&second=tiny@1");
     check(pairs.length === 15 && (counts.none ?? 0) === 0, "fifteen pairs", counts);
     const ratios = await page.locator(".rows tbody tr[data-index] td:nth-child(6)").allInnerTexts();
-    check(ratios.length === 15 && ratios.filter((r) => /^[\d.]+\s×/.test(r)).length >= 10, "ratios", ...ratios.slice(0, 4));
+    check(ratios.length === 15 && ratios.filter((r) => /^[\d.]+\s×/.test(r)).length >= 10, "ratios", ...ratios);
     check((await page.locator("svg.forest .value").count()) >= 10, "a forest");
   });
 }

@@ -76,6 +76,8 @@ export function virtualTable({
       total = rows;
       table.setAttribute("aria-rowcount", known + 1);
       draw(true);
+      // An empty box was as low as its head; now that it has rows it shows more of them.
+      draw(false);
     },
     top() {
       box.scrollTop = 0;
