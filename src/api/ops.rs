@@ -44,9 +44,8 @@ impl Counts {
     pub fn on(&self, event: &Event) {
         match event {
             Event::JobEnded { kind, outcome, .. } => {
-                let kind = if *kind == crate::store::Kind::Trial { "trial" } else { "judge" };
                 let mut outcomes = self.outcomes.lock().unwrap_or_else(PoisonError::into_inner);
-                *outcomes.entry((kind, outcome.to_string())).or_default() += 1;
+                *outcomes.entry((kind.word(), outcome.to_string())).or_default() += 1;
             }
             Event::Trouble { .. } => {
                 self.troubles.fetch_add(1, Ordering::Relaxed);

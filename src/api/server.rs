@@ -65,7 +65,7 @@ async fn state(app: &Shared) -> Answer<axum::Json<PoolState>> {
     let name = |id: i64| studies.iter().find(|s| s.id == id).map(|s| s.reference.clone());
     let line = |(id, w): (usize, super::state::Worker)| WorkerLine {
         id,
-        kind: w.kind.and_then(|k| serde_json::to_value(k).ok()?.as_str().map(str::to_string)),
+        kind: w.kind.map(|k| k.word().to_string()),
         study: w.study_id.and_then(name),
         since: w.kind.map(|_| super::utc(w.since_ms)),
         run: w.run,

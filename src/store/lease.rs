@@ -25,15 +25,27 @@ fn claim(kind: Kind, shared: bool) -> String {
             "EXISTS (SELECT 1 FROM study_runs r WHERE r.judgement_id = j.target AND r.study_id = $1)"
         }
     };
-    let (kind, free) = match kind {
-        Kind::Trial => ("trial", "1"),
-        Kind::Judge => ("judge", NOT_IN_THE_WAY),
-    };
+    let free = if kind == Kind::Judge { NOT_IN_THE_WAY } else { "1" };
+    let kind = kind.word();
     format!(
         "UPDATE jobs SET state = 'leased', owner = $2, epoch = epoch + 1, attempts = attempts + 1, \
          lease_until_ms = $3 WHERE id = (SELECT j.id FROM jobs j WHERE j.kind = '{kind}' AND j.state = 'queued' AND \
          {mine} AND {free} ORDER BY j.order_key LIMIT 1) RETURNING id, target, repeat_index, take, epoch"
     )
+}
+
+/// What a study says of the target of a job.
+fn cell(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Trial => {
+            "SELECT r.spec_json, s.policy_json, r.structure_label, r.culling_label FROM study_runs r JOIN studies s \
+             ON s.id = r.study_id WHERE r.study_id = $1 AND r.measurement_id = $2 LIMIT 1"
+        }
+        Kind::Judge => {
+            "SELECT r.spec_json, s.policy_json, r.structure_label, r.culling_label FROM study_runs r JOIN studies s \
+             ON s.id = r.study_id WHERE r.study_id = $1 AND r.judgement_id = $2 LIMIT 1"
+        }
+    }
 }
 
 /// Who may work for whom: trials count only on the class of machine, and from the
@@ -102,10 +114,8 @@ impl Store {
     }
 
     async fn candidates(&self, connection: &mut SqliteConnection, pool: &Pool, kind: Kind) -> Result<Vec<i64>> {
-        let (used, name) = match kind {
-            Kind::Trial => ("lane_ms", "trial"),
-            Kind::Judge => ("beside_ms", "judge"),
-        };
+        let used = if kind == Kind::Trial { "lane_ms" } else { "beside_ms" };
+        let name = kind.word();
         let sql = format!(
             "SELECT s.id FROM studies s WHERE s.state = 'active' AND s.machine_class = $1 AND s.build_profile IN ('', $2) \
              AND NOT EXISTS (SELECT 1 FROM settings WHERE name = 'pool' AND value = 'paused') \
@@ -139,21 +149,12 @@ impl Store {
                 .await
                 .map_err(explain)?;
             let Some((id, target, repeat, take, epoch)) = row else { return Ok(None) };
-            let row: Option<(String, String, String, String)> = sqlx::query_as(match kind {
-            Kind::Trial => {
-                "SELECT r.spec_json, s.policy_json, r.structure_label, r.culling_label FROM study_runs r JOIN studies s \
-                 ON s.id = r.study_id WHERE r.study_id = $1 AND r.measurement_id = $2 LIMIT 1"
-            }
-            Kind::Judge => {
-                "SELECT r.spec_json, s.policy_json, r.structure_label, r.culling_label FROM study_runs r JOIN studies s \
-                 ON s.id = r.study_id WHERE r.study_id = $1 AND r.judgement_id = $2 LIMIT 1"
-            }
-        })
-        .bind(study_id)
-        .bind(&target)
-        .fetch_optional(&mut **tx)
-        .await
-        .map_err(explain)?;
+            let row: Option<(String, String, String, String)> = sqlx::query_as(cell(kind))
+                .bind(study_id)
+                .bind(&target)
+                .fetch_optional(&mut **tx)
+                .await
+                .map_err(explain)?;
             let Some((spec, policy, structure, culling)) = row else {
                 // Nobody's any more: the study that it was queued for has another matrix now.
                 sqlx::query("UPDATE jobs SET state = 'cancelled', owner = NULL, lease_until_ms = 0 WHERE id = $1")

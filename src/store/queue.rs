@@ -32,6 +32,15 @@ pub enum Kind {
     Judge,
 }
 
+impl Kind {
+    pub fn word(self) -> &'static str {
+        match self {
+            Kind::Trial => "trial",
+            Kind::Judge => "judge",
+        }
+    }
+}
+
 /// What is to be done: identity within the queue.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Job {

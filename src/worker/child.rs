@@ -14,7 +14,7 @@ use std::process::{ExitStatus, Stdio};
 use std::sync::{OnceLock, mpsc};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
-use tokio::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command};
+use tokio::process::{Child, Command};
 
 /// Of standard error, the end tells why.
 const TAIL_BYTES: usize = 2000;
@@ -90,30 +90,10 @@ impl Launcher {
     /// # Errors
     /// When the child cannot be started at all, or met trouble that is not the run's.
     pub async fn run<T: for<'a> Deserialize<'a>>(&self, request: &Request<'_>, limit: Duration) -> Result<Ended<T>> {
-        let input = serde_json::to_vec(request).expect("a request is plain data");
-        let mut child = self.spawn(request.job)?;
-        let mut group = Group(child.id());
-        let (mut stdin, mut stdout, mut stderr) = pipes(&mut child);
-        let talk = async {
-            let write = async move {
-                // A child that dies before it has read everything shows in its status.
-                let _ = stdin.write_all(&input).await;
-                drop(stdin);
-            };
-            let read = async {
-                let mut out = Vec::new();
-                let _ = stdout.read_to_end(&mut out).await;
-                out
-            };
-            let ((), out, err) = tokio::join!(write, read, tail(&mut stderr));
-            (out, err, child.wait().await)
-        };
-        let Ok((out, err, status)) = tokio::time::timeout(limit, talk).await else {
-            group.kill();
-            let _ = child.wait().await;
+        let child = self.start("exec", request.job)?;
+        let Some((out, err, status)) = converse(child, request, limit).await else {
             return Ok(Ended::TimedOut(format!("timed out after {} s", limit.as_secs_f64())));
         };
-        group.0 = None;
         let status = status.map_err(|e| Error::new(format!("waiting for a child process: {e}")))?;
         interpret(&out, &err, status, request.memory_limit_mib)
     }
@@ -124,31 +104,11 @@ impl Launcher {
     /// # Errors
     /// When it cannot be started or takes longer than `limit`.
     pub async fn ask(&self, verb: &str, request: &impl Serialize, limit: Duration) -> Result<Answered> {
-        let input = serde_json::to_vec(request).expect("a request is plain data");
-        let mut child = self.beside(verb)?;
-        let mut group = Group(child.id());
-        let (mut stdin, mut stdout, mut stderr) = pipes(&mut child);
-        let talk = async {
-            let write = async move {
-                let _ = stdin.write_all(&input).await;
-                drop(stdin);
-            };
-            let read = async {
-                let mut out = Vec::new();
-                let _ = stdout.read_to_end(&mut out).await;
-                out
-            };
-            let ((), stdout, stderr) = tokio::join!(write, read, tail(&mut stderr));
-            Answered { stdout, stderr, success: child.wait().await.is_ok_and(|s| s.success()) }
-        };
-        let Ok(answered) = tokio::time::timeout(limit, talk).await else {
-            group.kill();
-            let _ = child.wait().await;
+        let Some((stdout, stderr, _)) = converse(self.beside(verb)?, request, limit).await else {
             return Err(Error::new(format!("reading it took longer than {} s", limit.as_secs()))
                 .help("send a smaller scene, or several"));
         };
-        group.0 = None;
-        Ok(answered)
+        Ok(Answered { stdout, stderr })
     }
 
     /// A child of this machine's other cores, which talks by its standard streams.
@@ -157,10 +117,6 @@ impl Launcher {
     /// When it cannot be started.
     pub fn beside(&self, verb: &str) -> Result<Child> {
         self.start(verb, Kind::Judge)
-    }
-
-    fn spawn(&self, kind: Kind) -> Result<Child> {
-        self.start("exec", kind)
     }
 
     fn start(&self, verb: &str, kind: Kind) -> Result<Child> {
@@ -219,7 +175,6 @@ pub struct Answered {
     pub stdout: Vec<u8>,
     /// Its end.
     pub stderr: String,
-    pub success: bool,
 }
 
 impl Answered {
@@ -230,8 +185,43 @@ impl Answered {
     }
 }
 
-fn pipes(child: &mut Child) -> (ChildStdin, ChildStdout, ChildStderr) {
-    (child.stdin.take().expect("piped"), child.stdout.take().expect("piped"), child.stderr.take().expect("piped"))
+/// Hands `request` to the child and waits for its end: what it wrote, the end of what it
+/// wrote beside, and its status. `None` when it took longer than `limit` and was killed.
+async fn converse(
+    mut child: Child,
+    request: &impl Serialize,
+    limit: Duration,
+) -> Option<(Vec<u8>, String, std::io::Result<ExitStatus>)> {
+    let input = serde_json::to_vec(request).expect("a request is plain data");
+    let mut group = Group(child.id());
+    let mut stdin = child.stdin.take().expect("piped");
+    let mut stdout = child.stdout.take().expect("piped");
+    let mut stderr = child.stderr.take().expect("piped");
+    let talk = async {
+        let write = async move {
+            // A child that dies before it has read everything shows in its status.
+            let _ = stdin.write_all(&input).await;
+            drop(stdin);
+        };
+        let read = async {
+            let mut out = Vec::new();
+            let _ = stdout.read_to_end(&mut out).await;
+            out
+        };
+        let ((), out, err) = tokio::join!(write, read, tail(&mut stderr));
+        (out, err, child.wait().await)
+    };
+    match tokio::time::timeout(limit, talk).await {
+        Ok(said) => {
+            group.0 = None;
+            Some(said)
+        }
+        Err(_) => {
+            group.kill();
+            let _ = child.wait().await;
+            None
+        }
+    }
 }
 
 /// Kills a whole process group, unless told that its leader has been waited for.

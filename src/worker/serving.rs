@@ -56,10 +56,8 @@ impl Crew {
                 self.store.return_orphans().await?;
                 for study_id in self.store.undecided(pool).await? {
                     let state = (self.store.now().await?, self.store.loose_ends(study_id).await?.len());
-                    if state.1 > 0 && looked.get(&study_id) != Some(&state) {
+                    if looked.insert(study_id, state) != Some(state) {
                         self.settle_all(study_id).await?;
-                        looked
-                            .insert(study_id, (self.store.now().await?, self.store.loose_ends(study_id).await?.len()));
                     }
                 }
                 Ok(())
