@@ -55,6 +55,24 @@ pub enum RunStatus {
     Wrong,
 }
 
+impl RunStatus {
+    pub const ALL: [RunStatus; 4] = [RunStatus::Pending, RunStatus::Done, RunStatus::Failed, RunStatus::Wrong];
+
+    pub fn word(self) -> &'static str {
+        match self {
+            RunStatus::Pending => "pending",
+            RunStatus::Done => "done",
+            RunStatus::Failed => "failed",
+            RunStatus::Wrong => "wrong",
+        }
+    }
+
+    /// A word that is none of these is of an open run.
+    pub fn of(word: &str) -> RunStatus {
+        RunStatus::ALL.into_iter().find(|s| s.word() == word).unwrap_or(RunStatus::Pending)
+    }
+}
+
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct RunResult {
     pub measurement_id: String,

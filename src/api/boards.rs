@@ -13,6 +13,7 @@ use crate::store::facts::{Fact, RunLine};
 use crate::store::{Detail, Store};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::Instant;
 
@@ -45,6 +46,8 @@ impl Board {
 
 pub struct Slot {
     board: RwLock<Board>,
+    /// Of the board, for those who must not wait for it.
+    rows: AtomicUsize,
     /// One at a time brings it up to date; by the clock of changes, when that was done last.
     refresh: tokio::sync::Mutex<Option<i64>>,
     used: Mutex<Instant>,
@@ -61,6 +64,7 @@ impl Boards {
         let slot = slots.entry(study_id).or_insert_with(|| {
             Arc::new(Slot {
                 board: RwLock::default(),
+                rows: AtomicUsize::new(0),
                 refresh: tokio::sync::Mutex::new(None),
                 used: Mutex::new(Instant::now()),
             })
@@ -72,7 +76,7 @@ impl Boards {
     /// Drops what has not been asked for longest while too much is held.
     fn trim(&self) {
         let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
-        let rows = |s: &Slot| s.board.read().map_or(0, |b| b.columns.len());
+        let rows = |s: &Slot| s.rows.load(Ordering::Relaxed);
         let mut total: usize = slots.values().map(|s| rows(s)).sum();
         while total > ROWS && slots.len() > 1 {
             let used = |s: &Slot| *s.used.lock().unwrap_or_else(PoisonError::into_inner);
@@ -118,6 +122,7 @@ async fn refresh(store: &Store, study_id: i64, slot: &Slot) -> Result<()> {
     let write = || tokio::task::block_in_place(|| slot.board.write().unwrap_or_else(PoisonError::into_inner));
     if !known {
         let board = load(store, study_id, stamp, now).await?;
+        slot.rows.store(board.columns.len(), Ordering::Relaxed);
         *write() = board;
     } else if seen < now {
         let lines = store.run_lines(study_id, seen, None).await?;

@@ -1,7 +1,7 @@
-//! Numbers of frames as an Arrow IPC stream: a column a series, read by pandas, Polars,
-//! DuckDB and R without a line of parsing.
+//! Numbers of frames, a column a series: as CSV, or as an Arrow IPC stream, which pandas,
+//! Polars, DuckDB and R read without a line of parsing.
 
-use super::run::heading;
+use crate::stats;
 use crate::store::run_page::FrameSeries;
 use arrow_array::{ArrayRef, Float64Array, RecordBatch, UInt32Array};
 use arrow_ipc::writer::StreamWriter;
@@ -27,6 +27,54 @@ pub fn stream(series: &[FrameSeries], frames: usize) -> Result<Vec<u8>, String> 
         writer.into_inner()
     };
     write().map_err(|e| e.to_string())
+}
+
+/// Counted series as they are, times as medians over trials at each frame.
+pub fn medians(all: Vec<FrameSeries>) -> Vec<FrameSeries> {
+    let mut out: Vec<FrameSeries> = Vec::new();
+    let mut done: Vec<String> = Vec::new();
+    for s in &all {
+        if s.trial.is_none() {
+            out.push(s.clone());
+        } else if !done.contains(&s.name) {
+            done.push(s.name.clone());
+            let trials: Vec<&FrameSeries> = all.iter().filter(|o| o.name == s.name).collect();
+            let frames = trials.iter().map(|t| t.values.len()).min().unwrap_or(0);
+            let values =
+                (0..frames).map(|f| stats::median(&trials.iter().map(|t| t.values[f]).collect::<Vec<_>>())).collect();
+            out.push(FrameSeries { name: s.name.clone(), unit: s.unit.clone(), trial: None, values });
+        }
+    }
+    out
+}
+
+/// How a series is called where it is one of many.
+fn heading(s: &FrameSeries) -> String {
+    let unit = if s.unit.is_empty() || s.name.ends_with(&format!("_{}", s.unit)) {
+        String::new()
+    } else {
+        format!(" ({})", s.unit)
+    };
+    let trial = s.trial.map_or_else(String::new, |t| format!(" trial {t}"));
+    format!("{}{unit}{trial}", s.name)
+}
+
+/// A row a frame; shorter series end in empty fields.
+pub fn csv(series: &[FrameSeries], frames: usize) -> String {
+    let mut out = String::from("frame");
+    series.iter().for_each(|s| out += &format!(",{}", heading(s)));
+    out.push('\n');
+    for f in 0..frames {
+        out += &f.to_string();
+        for s in series {
+            out.push(',');
+            if let Some(v) = s.values.get(f) {
+                out += &v.to_string();
+            }
+        }
+        out.push('\n');
+    }
+    out
 }
 
 #[cfg(test)]

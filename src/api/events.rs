@@ -217,7 +217,7 @@ pub async fn events(State(app): State<Shared>, _: Reader, Path(study): Path<Stri
     if finished {
         start.extend_from_slice(&message("end", &json!({})));
     }
-    let stream = futures_stream(app.clone(), study_id, receiver, Bytes::from(start));
+    let stream = stream_of(app.clone(), study_id, receiver, Bytes::from(start));
     let mut response = Response::new(Body::from_stream(stream));
     let headers = response.headers_mut();
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("text/event-stream"));
@@ -228,7 +228,7 @@ pub async fn events(State(app): State<Shared>, _: Reader, Path(study): Path<Stri
 }
 
 /// The first message, then what comes, a heartbeat in between.
-fn futures_stream(
+fn stream_of(
     app: Shared,
     study_id: i64,
     receiver: broadcast::Receiver<Bytes>,

@@ -85,10 +85,6 @@ impl Problem {
     }
 
     /// All mistakes of a manifest at once.
-    pub fn manifest(errors: Vec<Error>) -> Problem {
-        Problem::mistakes(errors.into_iter().map(Mistake::from).collect())
-    }
-
     pub fn mistakes(errors: Vec<Mistake>) -> Problem {
         let n = errors.len();
         let detail = errors.first().map(|e| e.message.clone()).unwrap_or_default();

@@ -11,10 +11,8 @@ use super::state::Shared;
 use crate::record::cameras;
 use crate::registry::format_sum;
 use crate::report::metrics::METRICS;
-use crate::report::table::status_word;
 use crate::report::tables::class_word;
 use crate::results::{RunResult, RunStatus};
-use crate::stats;
 use crate::store::Detail;
 use crate::store::run_page::{Attempt, FrameSeries, TrialLine};
 use axum::extract::{OriginalUri, State};
@@ -129,7 +127,7 @@ pub async fn run(
         walk: found.walk.clone(),
         axes: spec.axes.iter().map(|(k, v)| (k.clone(), format_sum(std::slice::from_ref(v)))).collect(),
         camera: cameras::label(&cameras::spec_of(&spec.camera)),
-        status: status_word(found.status),
+        status: found.status.word(),
         reason: found.reason.clone(),
         stop_reason: found.stop_reason.clone(),
         class: found.class.map(class_word),
@@ -210,7 +208,7 @@ pub async fn series(
     all.retain(|s| names.is_empty() || names.contains(&s.name));
     let chosen = match q.trial.as_deref().unwrap_or("median") {
         "all" => all,
-        "median" => medians(all),
+        "median" => columnar::medians(all),
         number => {
             let wanted: u32 = number
                 .parse()
@@ -228,7 +226,7 @@ pub async fn series(
                 (header::CONTENT_TYPE, "text/csv; charset=utf-8".to_string()),
                 (header::CONTENT_DISPOSITION, name("csv")),
             ];
-            caching::tagged((headers, csv(&chosen, frames)).into_response(), &tag)
+            caching::tagged((headers, columnar::csv(&chosen, frames)).into_response(), &tag)
         }
         SeriesForm::Arrow => {
             let bytes = columnar::stream(&chosen, frames).map_err(|e| Problem::internal(&e))?;
@@ -237,51 +235,4 @@ pub async fn series(
             caching::tagged((headers, bytes).into_response(), &tag)
         }
     })
-}
-
-/// Counted series as they are, times as medians over trials at each frame.
-fn medians(all: Vec<FrameSeries>) -> Vec<FrameSeries> {
-    let mut out: Vec<FrameSeries> = Vec::new();
-    let mut done: Vec<String> = Vec::new();
-    for s in &all {
-        if s.trial.is_none() {
-            out.push(s.clone());
-        } else if !done.contains(&s.name) {
-            done.push(s.name.clone());
-            let trials: Vec<&FrameSeries> = all.iter().filter(|o| o.name == s.name).collect();
-            let frames = trials.iter().map(|t| t.values.len()).min().unwrap_or(0);
-            let values =
-                (0..frames).map(|f| stats::median(&trials.iter().map(|t| t.values[f]).collect::<Vec<_>>())).collect();
-            out.push(FrameSeries { name: s.name.clone(), unit: s.unit.clone(), trial: None, values });
-        }
-    }
-    out
-}
-
-/// How a series is called where it is one of many.
-pub fn heading(s: &FrameSeries) -> String {
-    let unit = if s.unit.is_empty() || s.name.ends_with(&format!("_{}", s.unit)) {
-        String::new()
-    } else {
-        format!(" ({})", s.unit)
-    };
-    let trial = s.trial.map_or_else(String::new, |t| format!(" trial {t}"));
-    format!("{}{unit}{trial}", s.name)
-}
-
-fn csv(series: &[FrameSeries], frames: usize) -> String {
-    let mut out = String::from("frame");
-    series.iter().for_each(|s| out += &format!(",{}", heading(s)));
-    out.push('\n');
-    for f in 0..frames {
-        out += &f.to_string();
-        for s in series {
-            out.push(',');
-            if let Some(v) = s.values.get(f) {
-                out += &v.to_string();
-            }
-        }
-        out.push('\n');
-    }
-    out
 }

@@ -14,7 +14,7 @@ use crate::report::filter::Filter;
 use crate::report::metrics;
 use crate::report::query::DEFAULT_COLUMNS;
 use crate::report::select::{cell, mask, page};
-use crate::report::table::{Table, status_word};
+use crate::report::table::Table;
 use crate::results::RunStatus;
 use axum::extract::{OriginalUri, State};
 use axum::http::{HeaderMap, header};
@@ -179,7 +179,7 @@ fn line(board: &Board, row: usize, columns: &[(String, Field)]) -> RunLine {
         run: c.id(row),
         ordinal: c.ordinals[row],
         label: c.label.get(row).clone(),
-        status: status_word(c.status[row]),
+        status: c.status[row].word(),
         cells: columns.iter().map(|(name, field)| (name.clone(), cell_json(&cell(c, row, field)))).collect(),
     }
 }

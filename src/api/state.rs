@@ -153,6 +153,7 @@ impl App {
                 self.hub.run_ended(*study_id, measurement_id, run, *status, reason.as_deref());
             }
             Event::Trouble { worker, message, again_s } => {
+                self.set_worker(*worker, Worker::default());
                 tracing::error!(worker, why = message, again_s, "a worker met trouble and tries again");
             }
             Event::LaneBusy => tracing::info!("waiting for the measuring lane: another process holds it"),

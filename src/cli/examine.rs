@@ -78,13 +78,15 @@ fn stands_alone(file: &Path) -> Result<()> {
             .in_file(file)
             .help("export it as .glb, which holds everything in one file"));
     }
-    // A library beside it would be another's upload, or none: whatever is named is refused
-    // unless it is a plain name, and that is not there.
+    // One that is there beside it is another's upload.
     let outside = |library: &&PathBuf| library.parent() != file.parent() || library.exists();
     if let Some(library) = mtl::libraries(file, &bytes).iter().find(outside) {
-        return Err(Error::new(format!("the material library {} is in another folder", library.display()))
-            .in_file(file)
-            .help("name it without a folder, or take the `mtllib` line out: materials are then opaque"));
+        return Err(Error::new(format!(
+            "the material library {} is in another folder, or another file of this one",
+            library.display()
+        ))
+        .in_file(file)
+        .help("name it without a folder, or take the `mtllib` line out: materials are then opaque"));
     }
     Ok(())
 }

@@ -6,7 +6,7 @@
 //! and the bootstrap resamples trials as everywhere else.
 
 use super::metrics::{self, Kind, Metric};
-use super::table::{Cell, Column, Table, column, interval, number, status_word};
+use super::table::{Cell, Column, Table, column, interval, number};
 use crate::error::{Error, Result};
 use crate::record::cameras;
 use crate::registry::format_sum;
@@ -130,7 +130,7 @@ type Outcome = std::result::Result<((f64, f64, f64), Change), String>;
 fn ratio(a: &RunResult, b: &RunResult, metric: Option<&Metric>) -> Outcome {
     for (run, which) in [(a, "first"), (b, "second")] {
         if run.status != RunStatus::Done {
-            return Err(format!("{} in the {which}", status_word(run.status)));
+            return Err(format!("{} in the {which}", run.status.word()));
         }
     }
     let timed = metric.is_none_or(|m| matches!(m.kind, Kind::Measured | Kind::Modelled));

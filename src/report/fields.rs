@@ -3,7 +3,7 @@
 
 use super::filter::{Op, holds};
 use super::metrics::{self, Metric};
-use super::table::{Cell, Column, Table, column, interval, number, status_word};
+use super::table::{Cell, Column, Table, column, interval, number};
 use super::tables::class_word;
 use crate::claim::{Selector, axis_value};
 use crate::error::{Error, Result, did_you_mean};
@@ -39,19 +39,14 @@ pub struct Fields {
 
 impl Fields {
     pub fn of(results: &StudyResults) -> Fields {
-        let mut fields = Fields { axes: AXES.iter().map(|a| a.to_string()).collect(), ..Fields::default() };
-        for run in &results.runs {
-            for axis in run.spec.axes.keys() {
-                if !fields.axes.contains(axis) {
-                    fields.axes.push(axis.clone());
-                }
-            }
-            fields.numbers.extend(run.spec.numbers().into_keys());
-            for part in parts(run) {
-                fields.params.extend(part.params.keys().map(|p| (part.kind.clone(), p.clone())));
-            }
-        }
-        fields
+        let of_run = |run: &RunResult| {
+            parts(run).flat_map(|part| part.params.keys().map(|p| (part.kind.clone(), p.clone()))).collect::<Vec<_>>()
+        };
+        Fields::from_parts(
+            results.runs.iter().flat_map(|run| run.spec.axes.keys().cloned()),
+            results.runs.iter().flat_map(of_run).collect(),
+            results.runs.iter().flat_map(|run| run.spec.numbers().into_keys()).collect(),
+        )
     }
 
     /// Of runs whose parts are known otherwise.
@@ -67,10 +62,6 @@ impl Fields {
             }
         }
         Fields { axes, params, numbers }
-    }
-
-    pub fn axes(&self) -> &[String] {
-        &self.axes
     }
 
     pub fn find(&self, name: &str) -> Option<Field> {
@@ -244,7 +235,7 @@ fn params(run: &RunResult, kind: Option<&str>, name: &str) -> Vec<Value> {
 
 fn about(run: &RunResult, name: &str) -> Option<String> {
     match name {
-        "status" => Some(status_word(run.status).into()),
+        "status" => Some(run.status.word().into()),
         "class" => run.class.map(|c| class_word(c).into()),
         "combination" => Some(run.label()),
         "machine_class" => Some(run.machine_class.clone()),

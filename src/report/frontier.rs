@@ -11,7 +11,6 @@ use super::labels::Grid;
 use super::metrics::{Kind, Metric};
 use super::pareto;
 use super::style::IDLE;
-use super::table::status_word;
 use super::tables::class_word;
 use crate::culling::Class;
 use crate::record::FrameErrors;
@@ -120,7 +119,7 @@ fn coordinates(run: &RunResult, x: &Metric, y: &Metric) -> Result<(Spread, Sprea
         }
         other => {
             let reason = run.reason.as_ref().map_or_else(String::new, |r| format!(": {r}"));
-            return Err(format!("{}{reason}", status_word(other)));
+            return Err(format!("{}{reason}", other.word()));
         }
     }
     if let Some(why) = broken_promise(run) {

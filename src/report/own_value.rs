@@ -60,7 +60,7 @@ fn value(relation: Relation, runs: &[&RunResult], metric: &Metric) -> (Option<Ra
         match metric.interval(run).filter(|_| !unusable) {
             Some(interval) => found.push(interval),
             None => {
-                let state = super::table::status_word(run.status);
+                let state = run.status.word();
                 missing.get_or_insert(format!("{} is {state} or has no {}", run.label(), metric.name));
             }
         }

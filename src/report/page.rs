@@ -10,7 +10,7 @@ use super::labels::Grid;
 use super::repeatability::Repeatability;
 use super::style::DARK;
 use super::sweeps::Chart;
-use super::table::{Table, status_word};
+use super::table::Table;
 use crate::results::{RunStatus, StudyResults};
 use base64::Engine;
 use std::fmt::Write;
@@ -127,7 +127,7 @@ fn header(content: &Content) -> String {
     fact("runs done", with(RunStatus::Done), false);
     for (status, bad) in [(RunStatus::Pending, false), (RunStatus::Failed, true), (RunStatus::Wrong, true)] {
         if with(status) > 0 {
-            fact(status_word(status), with(status), bad);
+            fact(status.word(), with(status), bad);
         }
     }
     fact("trials", results.runs.iter().map(|r| r.trials.len()).sum(), false);

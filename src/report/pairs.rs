@@ -98,7 +98,7 @@ pub fn trials(pairs: &Pairs, metric: &Metric) -> Result<Trials, String> {
     for (a, b) in &pairs.pairs {
         for run in [a, b] {
             if run.status != RunStatus::Done {
-                return Err(format!("{} is {}", run.label(), super::table::status_word(run.status)));
+                return Err(format!("{} is {}", run.label(), run.status.word()));
             }
             if metric.value(run).is_none() {
                 return Err(format!("{} has no {}", run.label(), metric.name));

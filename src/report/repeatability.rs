@@ -9,7 +9,6 @@
 use super::compare::cell;
 use super::labels::place;
 use super::metrics::{self, METRICS, Metric};
-use super::table::status_word;
 use crate::results::{Measured, RunResult, RunStatus};
 use crate::stats;
 use std::collections::BTreeSet;
@@ -131,7 +130,7 @@ fn differs(out: &mut Repeatability, p: &Pair, what: String, first: String, secon
 fn counted(out: &mut Repeatability, p: &Pair) {
     let (a, b) = (p.first, p.second);
     if a.status != b.status {
-        differs(out, p, "status".into(), status_word(a.status).into(), status_word(b.status).into());
+        differs(out, p, "status".into(), a.status.word().into(), b.status.word().into());
     }
     if a.answer_id != b.answer_id {
         let short = |id: &str| id.chars().take(12).collect::<String>();

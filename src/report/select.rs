@@ -6,7 +6,7 @@ use super::fields::{Field, Fields, has_interval};
 use super::filter::{Filter, Op, holds};
 use super::metrics::{METRICS, Metric};
 use super::query::compare;
-use super::table::{Cell, status_word};
+use super::table::Cell;
 use super::tables::class_word;
 use crate::claim::Selector;
 use crate::error::{Error, Result};
@@ -104,7 +104,7 @@ fn test(columns: &Columns, field: &Field, op: Op, values: &[String]) -> Vec<bool
             }
             None => vec![false; columns.len()],
         },
-        Field::About("status") => by_few(&columns.status, |s| text(status_word(*s))),
+        Field::About("status") => by_few(&columns.status, |s| text(s.word())),
         Field::About("class") => by_few(&columns.class, |c| c.is_some_and(|c| text(class_word(c)))),
         Field::About("machine_class") => by_code(&columns.machine, |m| text(m)),
         Field::About("combination") => by_code(&columns.label, |l| text(l)),

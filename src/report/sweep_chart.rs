@@ -246,7 +246,7 @@ fn words(chart: &Chart, line: &Line, p: &Point) -> String {
         |(v, low, high)| format!("{}{}", format::interval(v, low, high), unit(chart.metric.unit)),
     );
     for run in p.runs.iter().filter(|r| r.status != RunStatus::Done) {
-        out += &format!("; {}", super::table::status_word(run.status));
+        out += &format!("; {}", run.status.word());
         out += &run.reason.as_ref().map_or_else(String::new, |why| format!(" ({why})"));
     }
     out

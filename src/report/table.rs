@@ -62,15 +62,6 @@ pub struct Table {
     pub rows: Vec<Vec<Cell>>,
 }
 
-pub fn status_word(status: RunStatus) -> &'static str {
-    match status {
-        RunStatus::Pending => "pending",
-        RunStatus::Done => "done",
-        RunStatus::Failed => "failed",
-        RunStatus::Wrong => "wrong",
-    }
-}
-
 pub fn number(value: Option<f64>) -> Cell {
     value.map_or(Cell::Missing, Cell::Number)
 }
@@ -86,7 +77,7 @@ impl Cell {
             Cell::Text(t) | Cell::Named(t, _) => t.clone(),
             Cell::Number(x) => format::number(*x, 3),
             Cell::Interval(v, low, high) => format::interval(*v, *low, *high),
-            Cell::Status(s) => status_word(*s).into(),
+            Cell::Status(s) => s.word().into(),
             Cell::Missing => "–".into(),
         }
     }
@@ -98,7 +89,7 @@ impl Cell {
             Cell::Text(t) | Cell::Named(t, _) => vec![t.clone()],
             Cell::Number(x) => vec![plain(*x)],
             Cell::Interval(v, low, high) => vec![plain(*v), plain(*low), plain(*high)],
-            Cell::Status(s) => vec![status_word(*s).into()],
+            Cell::Status(s) => vec![s.word().into()],
             Cell::Missing => vec![String::new()],
         };
         fields.resize(if interval { 3 } else { 1 }, String::new());
@@ -216,7 +207,7 @@ impl Table {
 /// One table cell, or two for a value with its interval.
 fn html_cell(cell: &Cell, column: &Column, head: bool) -> String {
     let text = match cell {
-        Cell::Status(s) => format!("<span class=\"s {0}\">{0}</span>", status_word(*s)),
+        Cell::Status(s) => format!("<span class=\"s {0}\">{0}</span>", s.word()),
         Cell::Named(t, look) => format!("{}{}", render::swatch(*look), format::html(t)),
         Cell::Interval(v, ..) => format::number(*v, 3),
         other => format::html(&other.show()),

@@ -2,7 +2,6 @@
 //! go on with a study.
 
 use super::Store;
-use super::read::status_of;
 use crate::error::Result;
 use crate::record::{RepeatPolicy, RunSpec};
 use crate::results::RunStatus;
@@ -69,7 +68,7 @@ impl Store {
             for (id, status, reason, repeats, wall) in rows {
                 walls.entry(id.clone()).or_default().extend(wall.map(|w| w as f64));
                 let known =
-                    KnownRun { status: status_of(&status), reason, repeats: repeats as u32, trial_wall_ns: None };
+                    KnownRun { status: RunStatus::of(&status), reason, repeats: repeats as u32, trial_wall_ns: None };
                 out.insert(id, known);
             }
             for (id, walls) in walls.into_iter().filter(|(_, w)| !w.is_empty()) {

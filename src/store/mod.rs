@@ -50,7 +50,7 @@ pub use control::StudyState;
 pub use lease::Pool;
 pub use overview::{Counted, JobCounts, Overview, RunCounts};
 pub use queue::{Accepted, Job, Kind, Lease, Left, Outcome};
-pub use read::{Detail, StudyInfo};
+pub use read::Detail;
 pub use series::read_series;
 pub use settle::Settled;
 pub use submit::{Cell, Submission, Submitted};

@@ -8,7 +8,6 @@ use crate::record::{Judgement, observed_class};
 use crate::results::{Excluded, RunResult, RunStatus, StudyResults, TrialSummary};
 use crate::stats;
 use rayon::prelude::*;
-use serde::Serialize;
 use sqlx::FromRow;
 use std::collections::{BTreeMap, HashMap};
 
@@ -19,18 +18,6 @@ pub enum Detail {
     Summary,
     /// Also the numbers of every frame: for charts.
     Frames,
-}
-
-/// A line of the list of studies.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct StudyInfo {
-    pub id: i64,
-    pub name: String,
-    pub series: u32,
-    pub title: String,
-    pub created_utc: String,
-    pub runs: u64,
-    pub done: u64,
 }
 
 #[derive(FromRow)]
@@ -66,42 +53,7 @@ const RUN_ROWS: &str = "SELECT r.measurement_id, r.judgement_id, r.spec_json, r.
     r.walk_label, m.answer_id, m.machine_class, m.status, m.reason, m.stop_reason FROM study_runs r \
     JOIN measurements m ON m.measurement_id = r.measurement_id WHERE r.study_id = $1";
 
-pub(super) fn status_of(text: &str) -> RunStatus {
-    match text {
-        "done" => RunStatus::Done,
-        "failed" => RunStatus::Failed,
-        "wrong" => RunStatus::Wrong,
-        _ => RunStatus::Pending,
-    }
-}
-
 impl Store {
-    /// All studies, the latest first.
-    ///
-    /// # Errors
-    /// When the database fails.
-    pub async fn studies(&self) -> Result<Vec<StudyInfo>> {
-        type Row = (i64, String, i64, String, i64, i64, i64);
-        let rows: Vec<Row> = sqlx::query_as(
-            "SELECT s.id, s.name, s.series, s.title, s.created_ms, count(r.ordinal), \
-             coalesce(sum(m.status = 'done'), 0) FROM studies s LEFT JOIN study_runs r ON r.study_id = s.id \
-             LEFT JOIN measurements m ON m.measurement_id = r.measurement_id GROUP BY s.id ORDER BY s.submitted_ms DESC, s.id DESC",
-        )
-        .fetch_all(&self.readers)
-        .await
-        .map_err(|e| self.explain("reading the studies", &e))?;
-        let info = |(id, name, series, title, created, runs, done): Row| StudyInfo {
-            id,
-            name,
-            series: series as u32,
-            title,
-            created_utc: utc(created),
-            runs: runs as u64,
-            done: done as u64,
-        };
-        Ok(rows.into_iter().map(info).collect())
-    }
-
     /// Everything of `study`: a name (its latest series) or `name@series`.
     ///
     /// # Errors
@@ -260,7 +212,7 @@ impl Store {
         counters: Option<&BTreeMap<String, f64>>,
         judgement: Option<&Judgement>,
     ) -> Result<RunResult> {
-        let mut status = status_of(&row.status);
+        let mut status = RunStatus::of(&row.status);
         let mut reason = row.reason.clone();
         // Another study may have judged the same answer more strictly, or this one not yet.
         if let Some(wrong) = judgement.and_then(|j| j.wrong.clone()) {

@@ -66,7 +66,7 @@ impl Store {
             .fetch_optional(&mut *tx)
             .await
             .map_err(explain)?;
-        settled.news = before.is_some_and(|status| status != word(settled.status));
+        settled.news = before.is_some_and(|status| status != settled.status.word());
         settled.trials_cancelled = write(&mut tx, measurement_id, &settled).await.map_err(explain)?;
         tx.commit().await.map_err(explain)?;
         Ok(settled)
@@ -346,17 +346,8 @@ async fn failed_job(
     }))
 }
 
-fn word(status: RunStatus) -> &'static str {
-    match status {
-        RunStatus::Pending => "pending",
-        RunStatus::Done => "done",
-        RunStatus::Failed => "failed",
-        RunStatus::Wrong => "wrong",
-    }
-}
-
 async fn write(tx: &mut Transaction<'_, Sqlite>, measurement_id: &str, s: &Settled) -> sqlx::Result<u32> {
-    let status = word(s.status);
+    let status = s.status.word();
     let finished = (s.status != RunStatus::Pending).then(now_ms);
     // What stays open looks to readers as it did.
     let changed = if s.status == RunStatus::Pending { None } else { Some(changes::tick(tx).await?) };

@@ -55,17 +55,22 @@ fn a_study_that_changes_its_matrix_lets_go_of_the_old_cells_and_holds_up_nobody(
     });
 }
 
+/// Two studies of one cell that ask for different judgements, before anything is judged:
+/// the measurement now names the second one's.
+async fn coarse_and_fine(store: &Store) {
+    let cell = spec("one", 1);
+    let mut finer = cell.clone();
+    finer.accuracy.width_px = 128;
+    store.submit(&study("coarse", vec![cell], 1)).await.unwrap();
+    store.submit(&study("fine", vec![finer], 1)).await.unwrap();
+}
+
 #[test]
 fn two_studies_may_judge_one_answer_differently_and_both_are_finished() {
     let dir = tempfile::tempdir().unwrap();
     wait(async {
         let store = open(dir.path()).await;
-        let cell = spec("one", 1);
-        let mut finer = cell.clone();
-        finer.accuracy.width_px = 128;
-        store.submit(&study("coarse", vec![cell], 1)).await.unwrap();
-        // Before anything is judged: the measurement now names the other judgement.
-        store.submit(&study("fine", vec![finer], 1)).await.unwrap();
+        coarse_and_fine(&store).await;
         work_off(&store).await;
         for name in ["coarse", "fine"] {
             let results = store.results(name).await.unwrap();
@@ -81,11 +86,7 @@ fn a_study_is_not_left_waiting_for_a_judgement_that_a_cancelled_one_asked_for() 
     let dir = tempfile::tempdir().unwrap();
     wait(async {
         let store = open(dir.path()).await;
-        let cell = spec("one", 1);
-        let mut finer = cell.clone();
-        finer.accuracy.width_px = 128;
-        store.submit(&study("coarse", vec![cell], 1)).await.unwrap();
-        store.submit(&study("fine", vec![finer], 1)).await.unwrap();
+        coarse_and_fine(&store).await;
         store.cancel("fine").await.unwrap();
         work_off(&store).await;
         assert_eq!(store.results("coarse").await.unwrap().runs[0].status, RunStatus::Done);
