@@ -11,6 +11,8 @@ ALTER TABLE studies ADD COLUMN beside_ms BIGINT NOT NULL DEFAULT 0;
 ALTER TABLE studies ADD COLUMN build_profile TEXT NOT NULL DEFAULT '';
 -- Where files that the manifest names start from; '' where it is not known.
 ALTER TABLE studies ADD COLUMN folder TEXT NOT NULL DEFAULT '';
+-- What its report was written from; '' before there is one.
+ALTER TABLE studies ADD COLUMN report_key TEXT NOT NULL DEFAULT '';
 
 -- Whose turn a job is. Jobs are shared, as measurements are: this is the study that
 -- asked first, or one that still wants it.

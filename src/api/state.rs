@@ -35,7 +35,9 @@ pub struct Config {
     pub rate: f64,
     /// A request may take so long.
     pub timeout: Duration,
-    /// For children that read scenes.
+    /// A run of a submitter may take so long.
+    pub run_timeout_s: f64,
+    /// For children that read and measure scenes.
     pub memory_limit_mib: u64,
     /// Whose trials this machine and build may measure.
     pub pool: Pool,

@@ -10,7 +10,7 @@ use crate::intake::{Wish, planned, series, setting, submission};
 use crate::manifest::Manifest;
 use crate::manifest::reach::Reach;
 use crate::matrix::{self, Matrix};
-use crate::record::{PathSource, RunSpec, SceneSource};
+use crate::record::{PathSource, RepeatPolicy, RunSpec, SceneSource};
 use crate::store::Submitted;
 use crate::store::control::PRIORITY_LIMIT;
 use axum::extract::{Request, State};
@@ -138,9 +138,30 @@ async fn take(app: &Shared, wanted: Wanted) -> Answer<Response> {
     Ok((StatusCode::CREATED, axum::Json(taken)).into_response())
 }
 
+/// A submitter's run holds the measuring lane no longer, and takes no more memory, than
+/// the server allows.
+fn bound(app: &App, repeat: &mut RepeatPolicy) -> Answer<()> {
+    let (seconds, mib) = (app.config.run_timeout_s, app.config.memory_limit_mib);
+    let mut errors = Vec::new();
+    if repeat.timeout_s > seconds {
+        let message = format!("is {} s, this server gives a run {seconds} s", repeat.timeout_s);
+        errors.push(crate::Error::new(message).key("measure.timeout_s").help("`serve --run-timeout-s` sets it"));
+    }
+    if repeat.memory_limit_mib.is_some_and(|m| m > mib) {
+        let message = format!("is {} MiB, this server gives a run {mib} MiB", repeat.memory_limit_mib.unwrap_or(0));
+        errors.push(
+            crate::Error::new(message).key("measure.memory_limit_mib").help("`serve --memory-limit-mib` sets it"),
+        );
+    }
+    repeat.memory_limit_mib.get_or_insert(mib);
+    if errors.is_empty() { Ok(()) } else { Err(mistaken(app, errors)) }
+}
+
 async fn read(app: &App, text: String, sets: Vec<String>, reach: Reach, path: PathBuf) -> Answer<Manifest> {
     let read = off_thread(move || Manifest::parse_within(text, &path, &sets, reach)).await?;
-    read.map_err(|errors| mistaken(app, errors))
+    let mut manifest = read.map_err(|errors| mistaken(app, errors))?;
+    bound(app, &mut manifest.repeat)?;
+    Ok(manifest)
 }
 
 async fn off_thread<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Answer<T> {

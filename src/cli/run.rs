@@ -3,6 +3,7 @@
 use super::progress::{Mode, Progress, duration, json_line};
 use super::signals::{self, INTERRUPTED};
 use super::{check, preflight};
+use crate::claim::Claim;
 use crate::error::Error;
 use crate::intake::{Wish, series, setting, submission};
 use crate::machine;
@@ -122,19 +123,28 @@ async fn study(
     let stopped = stopped?;
 
     let name = format!("{}@{series}", manifest.study.name);
-    let detail = if args.no_report || stopped { Detail::Summary } else { Detail::Frames };
-    let results = store.results_with(&name, detail).await?;
+    let results = store.results_with(&name, Detail::Summary).await?;
     let mut page = None;
     if !args.no_report && !stopped {
-        let all = store.all_series(&name, detail).await?;
-        let shown = if series == 0 { manifest.study.name.clone() } else { name };
+        let shown = if series == 0 { &manifest.study.name } else { &name };
         let out = args.out.clone().unwrap_or_else(|| folder.join(shown));
-        let files = crate::report::write_with_series(&results, &manifest.claims(), &all, &out)?;
-        store.record_artifacts(submitted.study_id, &out).await?;
-        page = Some(files.page);
+        page = Some(report(&store, submitted.study_id, &name, &manifest.claims(), &out).await?);
     }
     store.close().await;
     Ok(conclude(mode, &results, &End { stopped, page, told, elapsed: start.elapsed() }))
+}
+
+/// Writes the report, unless the one in `out` was made of the very same results.
+async fn report(store: &Store, study_id: i64, name: &str, claims: &[Claim], out: &Path) -> anyhow::Result<PathBuf> {
+    let key = store.report_key(study_id, out).await?;
+    if store.report_stands(study_id, &key).await? {
+        return Ok(out.join("index.html"));
+    }
+    let results = store.results_with(name, Detail::Frames).await?;
+    let series = store.all_series(name, Detail::Frames).await?;
+    let files = crate::report::write_with_series(&results, claims, &series, out)?;
+    store.record_artifacts(study_id, out, &key).await?;
+    Ok(files.page)
 }
 
 /// What the last words of a run are about, besides its results.

@@ -45,7 +45,10 @@ pub struct Args {
     /// A request may take so long
     #[arg(long, value_name = "S", default_value_t = 60)]
     timeout_s: u64,
-    /// Memory of processes that read and show scenes
+    /// A trial of a submitted study may take so long
+    #[arg(long, value_name = "S", default_value_t = 3600.0)]
+    run_timeout_s: f64,
+    /// Memory of processes that read, show and measure scenes
     #[arg(long, value_name = "MIB", default_value_t = 8192)]
     memory_limit_mib: u64,
     /// Listen beyond this machine without any token
@@ -156,6 +159,7 @@ async fn serve(args: Args, launcher: Launcher, pool: Pool) -> anyhow::Result<Exi
         max_cells: args.max_cells,
         rate: args.rate,
         timeout: Duration::from_secs(args.timeout_s.max(1)),
+        run_timeout_s: args.run_timeout_s,
         memory_limit_mib: args.memory_limit_mib,
         pool: pool.clone(),
         launcher,

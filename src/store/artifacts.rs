@@ -13,13 +13,55 @@ pub struct Artifact {
 }
 
 impl Store {
+    /// A hash of everything that the report of a study in `folder` is made of: the program,
+    /// all series of the study, and when a measurement of theirs changed last.
+    ///
+    /// # Errors
+    /// When there is no such study or the database fails.
+    pub async fn report_key(&self, study_id: i64, folder: &Path) -> Result<String> {
+        type Series = (i64, i64, String, String, String, String, String, i64, Option<i64>);
+        let series: Vec<Series> = sqlx::query_as(
+            "SELECT s.id, s.series, s.title, s.manifest_toml, s.claims_json, s.sweeps_json, s.runs_hash, \
+             s.consolidate_frames, (SELECT max(m.changed) FROM study_runs r JOIN measurements m \
+             ON m.measurement_id = r.measurement_id WHERE r.study_id = s.id) FROM studies s \
+             WHERE s.name = (SELECT name FROM studies WHERE id = $1) ORDER BY s.series",
+        )
+        .bind(study_id)
+        .fetch_all(&self.readers)
+        .await
+        .map_err(|e| self.explain("reading the studies", &e))?;
+        let folder = std::path::absolute(folder).map_err(|e| Error::io(folder, "it cannot be named", &e))?;
+        let made_of = serde_json::to_vec(&(program(), study_id, folder, series)).expect("plain data");
+        Ok(blake3::hash(&made_of).to_hex().to_string())
+    }
+
+    /// Whether the recorded files are those of `key`, and still as they were written.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn report_stands(&self, study_id: i64, key: &str) -> Result<bool> {
+        let kept: Option<String> = sqlx::query_scalar("SELECT report_key FROM studies WHERE id = $1")
+            .bind(study_id)
+            .fetch_optional(&self.readers)
+            .await
+            .map_err(|e| self.explain("reading the study", &e))?;
+        if kept.is_none_or(|kept| kept != key) {
+            return Ok(false);
+        }
+        let files = self.artifacts(study_id).await?;
+        let same = |f: &Artifact| std::fs::read(&f.path).is_ok_and(|b| *blake3::hash(&b).to_hex() == *f.blake3);
+        Ok(!files.is_empty() && files.iter().all(same))
+    }
+
     /// Records every file below `folder` as made by the study; earlier entries of it are replaced.
+    /// `key` is the [`Store::report_key`] of before the files were written.
     ///
     /// # Errors
     /// When a file cannot be read or the database fails.
-    pub async fn record_artifacts(&self, study_id: i64, folder: &Path) -> Result<usize> {
+    pub async fn record_artifacts(&self, study_id: i64, folder: &Path, key: &str) -> Result<usize> {
+        let folder = std::path::absolute(folder).map_err(|e| Error::io(folder, "it cannot be named", &e))?;
         let mut files = Vec::new();
-        for path in files_below(folder)? {
+        for path in files_below(&folder)? {
             let bytes = std::fs::read(&path).map_err(|e| Error::io(&path, "it cannot be read back", &e))?;
             files.push((path.display().to_string(), bytes.len() as i64, blake3::hash(&bytes).to_hex().to_string()));
         }
@@ -43,6 +85,12 @@ impl Store {
             .await
             .map_err(explain)?;
         }
+        sqlx::query("UPDATE studies SET report_key = $2 WHERE id = $1")
+            .bind(study_id)
+            .bind(key)
+            .execute(&mut *tx)
+            .await
+            .map_err(explain)?;
         tx.commit().await.map_err(explain)?;
         Ok(files.len())
     }
@@ -60,6 +108,14 @@ impl Store {
                 .map_err(|e| self.explain("the list of files", &e))?;
         Ok(rows.into_iter().map(|(path, bytes, blake3)| Artifact { path, bytes: bytes as u64, blake3 }).collect())
     }
+}
+
+/// Tells one build of the program from another: what draws a report may have been changed.
+fn program() -> Option<(PathBuf, u64, std::time::SystemTime)> {
+    let exe = std::env::current_exe().ok()?;
+    let about = exe.metadata().ok()?;
+    let modified = about.modified().ok()?;
+    Some((exe, about.len(), modified))
 }
 
 fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {

@@ -43,23 +43,27 @@ impl StudyState {
 /// Jobs of `$1` that wait go to another active study that wants them too, if there is one.
 const HAND_OVER: [&str; 2] = [
     "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
-     WHERE r.measurement_id = jobs.target AND s.state = 'active' AND s.id <> $1 LIMIT 1), study_id) \
+     WHERE r.measurement_id = jobs.target AND s.state = 'active' AND s.id <> $1 \
+     ORDER BY s.priority DESC LIMIT 1), study_id) \
      WHERE study_id = $1 AND kind = 'trial' AND state IN ('queued', 'leased')",
     "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
      WHERE r.judgement_id = jobs.target AND s.state = 'active' AND s.id <> $1 \
-     AND s.machine_class = (SELECT machine_class FROM studies WHERE id = $1) LIMIT 1), study_id) \
+     AND s.machine_class = (SELECT machine_class FROM studies WHERE id = $1) \
+     ORDER BY s.priority DESC LIMIT 1), study_id) \
      WHERE study_id = $1 AND kind = 'judge' AND state IN ('queued', 'leased')",
 ];
 
 /// Jobs of `$1` that its matrix does not hold any more go to another study, or end.
 const LET_GO: [&str; 3] = [
     "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
-     WHERE r.measurement_id = jobs.target AND s.state = 'active' LIMIT 1), study_id) \
+     WHERE r.measurement_id = jobs.target AND s.state = 'active' \
+     ORDER BY s.priority DESC LIMIT 1), study_id) \
      WHERE study_id = $1 AND kind = 'trial' AND state IN ('queued', 'leased') AND target NOT IN \
      (SELECT measurement_id FROM study_runs WHERE study_id = $1)",
     "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
      WHERE r.judgement_id = jobs.target AND s.state = 'active' \
-     AND s.machine_class = (SELECT machine_class FROM studies WHERE id = $1) LIMIT 1), study_id) \
+     AND s.machine_class = (SELECT machine_class FROM studies WHERE id = $1) \
+     ORDER BY s.priority DESC LIMIT 1), study_id) \
      WHERE study_id = $1 AND kind = 'judge' AND state IN ('queued', 'leased') AND target NOT IN \
      (SELECT judgement_id FROM study_runs WHERE study_id = $1)",
     "UPDATE jobs SET state = 'cancelled' WHERE study_id = $1 AND state = 'queued' AND kind IN ('trial', 'judge') \
@@ -78,6 +82,23 @@ const TAKE_BACK: [&str; 2] = [
      AND target IN (SELECT judgement_id FROM study_runs WHERE study_id = $1) \
      AND (state = 'cancelled' OR study_id NOT IN (SELECT id FROM studies WHERE state = 'active' \
      AND machine_class = (SELECT machine_class FROM studies WHERE id = $1)))",
+];
+
+/// Jobs that `$1` shares with others wait for the most urgent one that wants them, and for
+/// the one they have waited for among equals.
+const MOST_URGENT: [&str; 2] = [
+    "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
+     WHERE r.measurement_id = jobs.target AND s.state = 'active' \
+     AND s.build_profile = (SELECT build_profile FROM studies WHERE id = jobs.study_id) \
+     AND s.priority > (SELECT priority FROM studies WHERE id = jobs.study_id) ORDER BY s.priority DESC LIMIT 1), study_id) \
+     WHERE (SELECT count(DISTINCT priority) FROM studies WHERE state = 'active') > 1 \
+     AND kind = 'trial' AND state = 'queued' AND target IN (SELECT measurement_id FROM study_runs WHERE study_id = $1)",
+    "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
+     WHERE r.judgement_id = jobs.target AND s.state = 'active' \
+     AND s.machine_class = (SELECT machine_class FROM studies WHERE id = jobs.study_id) \
+     AND s.priority > (SELECT priority FROM studies WHERE id = jobs.study_id) ORDER BY s.priority DESC LIMIT 1), study_id) \
+     WHERE (SELECT count(DISTINCT priority) FROM studies WHERE state = 'active') > 1 \
+     AND kind = 'judge' AND state = 'queued' AND target IN (SELECT judgement_id FROM study_runs WHERE study_id = $1)",
 ];
 
 impl Store {
@@ -101,6 +122,7 @@ impl Store {
         set_state(&mut tx, id, StudyState::Active).await.map_err(|e| self.explain("the study", &e))?;
         self.run_all(&mut tx, &TAKE_BACK, id).await?;
         join_the_queue(&mut tx, id).await.map_err(|e| self.explain("the study", &e))?;
+        most_urgent(&mut tx, id).await.map_err(|e| self.explain("the study", &e))?;
         self.commit(tx).await
     }
 
@@ -144,6 +166,7 @@ impl Store {
         set_state(&mut tx, id, StudyState::Active).await.map_err(explain)?;
         self.run_all(&mut tx, &TAKE_BACK, id).await?;
         join_the_queue(&mut tx, id).await.map_err(explain)?;
+        most_urgent(&mut tx, id).await.map_err(explain)?;
         self.commit(tx).await
     }
 
@@ -161,6 +184,7 @@ impl Store {
             .execute(&mut *tx)
             .await
             .map_err(|e| self.explain("the study", &e))?;
+        most_urgent(&mut tx, id).await.map_err(|e| self.explain("the study", &e))?;
         self.commit(tx).await
     }
 
@@ -250,6 +274,14 @@ async fn set_state(tx: &mut Transaction<'_, Sqlite>, id: i64, state: StudyState)
 /// After a matrix was replaced.
 pub(super) async fn let_go(tx: &mut Transaction<'_, Sqlite>, id: i64) -> sqlx::Result<()> {
     for sql in LET_GO {
+        sqlx::query(sql).bind(id).execute(&mut **tx).await?;
+    }
+    Ok(())
+}
+
+/// After priorities, or who wants what, have changed.
+pub(super) async fn most_urgent(tx: &mut Transaction<'_, Sqlite>, id: i64) -> sqlx::Result<()> {
+    for sql in MOST_URGENT {
         sqlx::query(sql).bind(id).execute(&mut **tx).await?;
     }
     Ok(())

@@ -172,6 +172,7 @@ async fn submit(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]) -
     insert_measurements(tx, s, ids, &new).await?;
     out.jobs_added += insert_judge_jobs(tx, study_id, ids, &blocks, &judge).await?;
     out.jobs_added += insert_trial_jobs(tx, study_id, s, ids, &blocks, &open).await?;
+    control::most_urgent(tx, study_id).await?;
     Ok(out)
 }
 

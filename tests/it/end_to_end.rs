@@ -112,6 +112,39 @@ fn a_study_goes_from_its_manifest_to_a_report_and_into_another_database() {
 }
 
 #[test]
+fn a_report_is_written_again_only_when_it_would_differ_or_was_touched() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    std::fs::write(dir.join("m.toml"), STUDY).unwrap();
+    let page = dir.join("tiny/index.html");
+    // A page that is left alone keeps this time.
+    let long_ago = std::time::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000_000);
+    let written = |more: &str| {
+        let told = run(dir, more).0["report"].as_str().unwrap().to_string();
+        assert!(told.ends_with("index.html"), "{told}");
+        let file = std::fs::File::options().write(true).open(dir.join(told)).unwrap();
+        let new = file.metadata().unwrap().modified().unwrap() != long_ago;
+        file.set_modified(long_ago).unwrap();
+        new
+    };
+    assert!(written(""), "the first time");
+    assert!(!written(""), "nothing changed");
+    assert!(written("--set measure.repeats=3"), "one more trial a cell");
+    assert!(!written("--set measure.repeats=3"));
+    assert!(written("--set measure.repeats=3 --series 1"), "its own report");
+    assert!(written("--set measure.repeats=3"), "another series belongs in it");
+    std::fs::write(dir.join("m.toml"), STUDY.replace("A tiny study", "A small study")).unwrap();
+    assert!(written("--set measure.repeats=3"), "another title");
+    let whole = std::fs::read(&page).unwrap();
+    std::fs::write(&page, "scribbled over").unwrap();
+    assert!(written("--set measure.repeats=3"), "the page was changed");
+    assert_eq!(std::fs::read(&page).unwrap(), whole);
+    std::fs::remove_file(dir.join("tiny/charts/total-time.svg")).unwrap();
+    assert!(written("--set measure.repeats=3"), "a chart is missing");
+    assert!(dir.join("tiny/charts/total-time.svg").exists());
+}
+
+#[test]
 fn submitted_ids_are_ascending_and_unique_and_all_of_them_are_counted_from_0() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();

@@ -63,6 +63,23 @@ fn a_manifest_names_files_of_the_offered_folder_and_none_beyond_it() {
 }
 
 #[test]
+fn a_run_takes_no_more_time_and_memory_than_the_server_gives() {
+    let (server, _) = confined();
+    let check = |set: &[&str]| {
+        server.post("/studies", &json!({ "manifest": study("town"), "set": set, "validate_only": true }))
+    };
+    check(&["measure.timeout_s=3600", "measure.memory_limit_mib=8192"]).with(200);
+    let problem = check(&["measure.timeout_s=3601", "measure.memory_limit_mib=8193"]).problem(422);
+    for (i, key) in ["timeout_s", "memory_limit_mib"].iter().enumerate() {
+        let e = &problem["errors"][i];
+        assert_eq!(e["key"], format!("measure.{key}"), "{problem}");
+        assert!(e["help"].as_str().unwrap().contains("serve --"), "{problem}");
+    }
+    server.submit(&study("town"));
+    assert_eq!(server.json("/studies/town")["policy"]["memory_limit_mib"], 8192, "where it says nothing");
+}
+
+#[test]
 fn what_a_manifest_is_merged_from_is_told_without_the_places_of_files() {
     let (server, _) = confined();
     let layered = format!("extends = \"layer.toml\"\n{}", study("town").replace("repeats = 3\n", ""));

@@ -69,7 +69,7 @@ async fn fill(path: &Path) -> String {
     let report = path.parent().unwrap().join("report");
     std::fs::create_dir_all(&report).unwrap();
     std::fs::write(report.join("index.html"), "x").unwrap();
-    store.record_artifacts(id, &report).await.unwrap();
+    store.record_artifacts(id, &report, "k").await.unwrap();
     let results = format!("{:?}", store.results("a").await.unwrap().runs);
     store.close().await;
     results

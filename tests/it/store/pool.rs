@@ -83,6 +83,36 @@ fn a_higher_priority_goes_first_whenever_it_came() {
 }
 
 #[test]
+fn what_an_urgent_study_shares_with_a_patient_one_is_urgent_too() {
+    let dir = tempfile::tempdir().unwrap();
+    wait(async {
+        let store = open(dir.path()).await;
+        // Their first cells are the same measurements.
+        let patient = store.submit(&unjudged("patient", 4, 1)).await.unwrap().study_id;
+        let other = with_priority(study("other", vec![spec("elsewhere", 1)], 1), 1);
+        let other = store.submit(&other).await.unwrap().study_id;
+        let urgent = with_priority(study("urgent", vec![spec("patient", 1), spec("patient", 2)], 1), 2);
+        let urgent = store.submit(&urgent).await.unwrap().study_id;
+        assert_eq!(step(&store, |_| 1).await, Some(urgent), "though the patient one asked for it first");
+        store.set_priority("urgent", -1).await.unwrap();
+        assert_eq!(step(&store, |_| 1).await, Some(other));
+        store.set_priority("urgent", 7).await.unwrap();
+        assert_eq!(step(&store, |_| 1).await, Some(urgent));
+        let mut order = Vec::new();
+        while let Some(id) = step(&store, |_| 1).await {
+            order.push(id);
+        }
+        assert_eq!(order, [patient, patient]);
+    });
+}
+
+fn with_priority(mut submission: Submission, priority: i64) -> Submission {
+    submission.priority = priority;
+    submission.cells.iter_mut().for_each(|c| c.spec.accuracy.frames = 0);
+    submission
+}
+
+#[test]
 fn studies_of_one_priority_alternate_and_get_equal_time_rather_than_equal_turns() {
     let dir = tempfile::tempdir().unwrap();
     wait(async {
