@@ -48,6 +48,7 @@ pub mod tables;
 use crate::claim::Claim;
 use crate::error::{Error, Result};
 use crate::results::{Measured, StudyResults};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// What [`write`] wrote.
@@ -104,11 +105,15 @@ pub fn write_with_series(
     }
     let mut files = Files { page: out_dir.join("index.html"), charts: Vec::new(), tables: Vec::new() };
     let mut inline = Vec::new();
-    for figure in &figures {
-        let base = out_dir.join("charts");
-        files.charts.push(save(&base.join(format!("{}.svg", figure.id)), render::svg(figure, true)?.as_bytes())?);
-        files.charts.push(save(&base.join(format!("{}.png", figure.id)), &render::png(figure)?)?);
-        inline.push(render::svg(figure, false)?);
+    let base = out_dir.join("charts");
+    let drawn = figures.par_iter().map(|figure| {
+        let svg = save(&base.join(format!("{}.svg", figure.id)), render::svg(figure, true)?.as_bytes())?;
+        let png = save(&base.join(format!("{}.png", figure.id)), &render::png(figure)?)?;
+        Ok(([svg, png], render::svg(figure, false)?))
+    });
+    for (paths, svg) in drawn.collect::<Result<Vec<_>>>()? {
+        files.charts.extend(paths);
+        inline.push(svg);
     }
     for table in tables.iter().filter(|t| !t.rows.is_empty()) {
         let base = out_dir.join("tables");

@@ -133,6 +133,9 @@ pub fn png(figure: &Figure) -> Result<Vec<u8>> {
     let mut encoder = png::Encoder::new(&mut out, w as u32, h as u32);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
+    // Of drawings with large even areas: smaller than the usual setting, in half its time.
+    encoder.set_filter(png::Filter::NoFilter);
+    encoder.set_deflate_compression(png::DeflateCompression::Level(4));
     // 2 pixels a figure pixel of 1/96 inch.
     let per_metre = (96.0 * PNG_SCALE as f64 / 0.0254).round() as u32;
     encoder.set_pixel_dims(Some(png::PixelDimensions { xppu: per_metre, yppu: per_metre, unit: png::Unit::Meter }));
@@ -144,15 +147,16 @@ pub fn png(figure: &Figure) -> Result<Vec<u8>> {
 
 /// Mean of each square of samples.
 fn average(fine: &[u8], w: usize, h: usize) -> Vec<u8> {
-    let s = PNG_SAMPLES;
-    let row = 3 * w * s;
+    const { assert!(PNG_SAMPLES == 2) };
     let mut out = Vec::with_capacity(3 * w * h);
-    for y in 0..h {
-        for x in 0..w {
-            for c in 0..3 {
-                let samples = (0..s * s).map(|i| u32::from(fine[(y * s + i / s) * row + (x * s + i % s) * 3 + c]));
-                out.push((samples.sum::<u32>() / (s * s) as u32) as u8);
-            }
+    for rows in fine.chunks_exact(2 * 6 * w) {
+        let (upper, lower) = rows.split_at(6 * w);
+        for (u, l) in upper.chunks_exact(6).zip(lower.chunks_exact(6)) {
+            let mean = |c: usize| {
+                let sum = [u[c], u[c + 3], l[c], l[c + 3]].map(u32::from);
+                (sum.iter().sum::<u32>() / 4) as u8
+            };
+            out.extend([mean(0), mean(1), mean(2)]);
         }
     }
     out
