@@ -3,7 +3,7 @@
 
 import { api, isAbort, segment } from "/api.js";
 import { metricCatalog, metricSelect } from "/parts/catalog.js";
-import { debounce, field, h, select, set, setText } from "/parts/dom.js";
+import { debounce, field, h, pageHead, select, set, setText } from "/parts/dom.js";
 import { forest } from "/parts/forest.js";
 import { cellNode, intervalTexts, missing, number } from "/parts/format.js";
 import { readQuery, writeQuery } from "/parts/query.js";
@@ -40,19 +40,9 @@ export function mount(root, { signal, setTitle }) {
   const body = h("div", null);
   set(
     root,
-    h(
-      "div",
-      { class: "head" },
-      h(
-        "div",
-        null,
-        h("h1", null, "Compare two studies"),
-        h(
-          "p",
-          { class: "muted" },
-          "Cells are paired by scene, path, structure, culling and all other axes. A ratio is the second over the first.",
-        ),
-      ),
+    pageHead(
+      "Compare two studies",
+      "Cells are paired by scene, path, structure, culling and all other axes. A ratio is the second over the first.",
     ),
     form,
     body,

@@ -2,7 +2,7 @@
 
 import { api, isAbort, segment } from "/api.js";
 import { notice, noticeError } from "/parts/dialog.js";
-import { button, h, set } from "/parts/dom.js";
+import { button, h, pageHead, set } from "/parts/dom.js";
 import { instant, missing } from "/parts/format.js";
 import { jobWord } from "/parts/status.js";
 import { session, watchSession, whyNot } from "/parts/session.js";
@@ -28,16 +28,7 @@ export function mount(root, { signal, setTitle }) {
   const version = h("div");
   set(
     root,
-    h(
-      "div",
-      { class: "head" },
-      h(
-        "div",
-        null,
-        h("h1", null, "Machine"),
-        h("p", { class: "muted" }, "Times are worth as much as the machine is quiet."),
-      ),
-    ),
+    pageHead("Machine", "Times are worth as much as the machine is quiet."),
     h("section", { "aria-label": "Worker pool", class: "card" }, pool),
     h("section", { "aria-label": "Checks" }, checks),
     h("section", { class: "card", "aria-label": "Version" }, h("h2", null, "Version"), version),

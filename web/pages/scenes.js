@@ -3,7 +3,7 @@
 
 import { api, isAbort, segment } from "/api.js";
 import { ask, copy, notice, noticeError } from "/parts/dialog.js";
-import { button, h, set } from "/parts/dom.js";
+import { button, h, pageHead, set } from "/parts/dom.js";
 import { bytes, count, instant, missing, number } from "/parts/format.js";
 import { watchSession, whyNot } from "/parts/session.js";
 import { empty, guarded, loading } from "/parts/states.js";
@@ -27,19 +27,9 @@ export function mount(root, { signal, setTitle }) {
   const list = h("div", null, loading("Loading scenes and paths"));
   set(
     root,
-    h(
-      "div",
-      { class: "head" },
-      h(
-        "div",
-        null,
-        h("h1", null, "Scenes and paths"),
-        h(
-          "p",
-          { class: "muted" },
-          "Files that manifests can name. Each is read and checked before it is kept.",
-        ),
-      ),
+    pageHead(
+      "Scenes and paths",
+      "Files that manifests can name. Each is read and checked before it is kept.",
     ),
     drop,
     queue,

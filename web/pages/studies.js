@@ -1,7 +1,7 @@
 // The list of studies: how far each is, and what can be done with it.
 
 import { api, isAbort, segment } from "/api.js";
-import { debounce, h, select, set } from "/parts/dom.js";
+import { debounce, h, pageHead, select, set } from "/parts/dom.js";
 import { instant, number } from "/parts/format.js";
 import { readQuery, writeQuery } from "/parts/query.js";
 import { empty, loading, problem } from "/parts/states.js";
@@ -85,17 +85,12 @@ export function mount(root, { signal, navigate, setTitle }) {
 
   set(
     root,
-    h(
-      "div",
-      { class: "head" },
-      h("div", null, h("h1", null, "Studies")),
-      h(
-        "div",
-        { class: "head-tools" },
-        search,
-        kind,
-        h("a", { class: "button primary", href: "/submit" }, "New study"),
-      ),
+    pageHead(
+      "Studies",
+      null,
+      search,
+      kind,
+      h("a", { class: "button primary", href: "/submit" }, "New study"),
     ),
     lost,
     place,

@@ -1,9 +1,9 @@
 // The charts of the report, drawn by the server, each fetched when it comes into view.
 
-import { api, isAbort } from "/api.js";
+import { api } from "/api.js";
 import { noticeError } from "/parts/dialog.js";
 import { h, set } from "/parts/dom.js";
-import { empty, guarded, loading, problem } from "/parts/states.js";
+import { empty, guarded, loading } from "/parts/states.js";
 
 /** A list first; each chart is drawn by the server when somebody scrolls to it. */
 export async function mount(panel, study) {
@@ -42,13 +42,7 @@ export async function mount(panel, study) {
         addresses.add(address);
         set(place, h("img", { src: address, alt: `${item.title}. ${item.description || ""}` }));
       } catch (error) {
-        if (isAbort(error)) return;
-        if (study.filterError(error)) set(place, empty("The filter is not valid"));
-        else
-          set(
-            place,
-            problem(error, () => (set(place, loading("Drawing")), place.fetchChart())),
-          );
+        study.failed(place, error, () => (set(place, loading("Drawing")), place.fetchChart()));
       }
     };
     watcher.observe(place);

@@ -1,6 +1,6 @@
 // Pareto fronts, scene by scene: what no other run beats in both of two metrics.
 
-import { api, isAbort, segment } from "/api.js";
+import { api, segment } from "/api.js";
 import { firstOf, metricCatalog, metricSelect } from "/parts/catalog.js";
 import { field, h, select, set, throttle } from "/parts/dom.js";
 import { count } from "/parts/format.js";
@@ -8,7 +8,7 @@ import { looks, markerIcon, split } from "/parts/looks.js";
 import { readQuery, writeQuery } from "/parts/query.js";
 import { frontTable, scatter } from "/parts/scatter.js";
 import { wantsLog } from "/parts/scales.js";
-import { empty, loading, problem } from "/parts/states.js";
+import { empty, loading } from "/parts/states.js";
 import { hideTip } from "/parts/tooltip.js";
 
 const LIVE_MS = 6000;
@@ -110,13 +110,7 @@ export async function mount(panel, study) {
       study.filterError(null);
       draw();
     } catch (error) {
-      if (isAbort(error)) return;
-      if (study.filterError(error)) set(body, empty("The filter is not valid"));
-      else if (!quiet)
-        set(
-          body,
-          problem(error, () => load()),
-        );
+      study.failed(body, error, () => load(), { quiet });
     }
   }
 

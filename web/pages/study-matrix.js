@@ -1,6 +1,6 @@
 // The matrix of a study: scenes × combinations, coloured by any metric.
 
-import { api, isAbort, segment } from "/api.js";
+import { api, segment } from "/api.js";
 import { firstOf, metricCatalog, metricSelect } from "/parts/catalog.js";
 import { field, h, onceAFrame, select, set, setText, throttle } from "/parts/dom.js";
 import { cellNode, interval, number, tick } from "/parts/format.js";
@@ -8,7 +8,7 @@ import { heatMap } from "/parts/heat.js";
 import { heatData } from "/parts/heat-data.js";
 import { readQuery, writeQuery } from "/parts/query.js";
 import { axis, ramp, wantsLog } from "/parts/scales.js";
-import { empty, loading, problem } from "/parts/states.js";
+import { empty, loading } from "/parts/states.js";
 import { badge } from "/parts/status.js";
 import { hideTip, showTip, tipLine } from "/parts/tooltip.js";
 import { watchTheme } from "/parts/theme.js";
@@ -142,13 +142,7 @@ export async function mount(panel, study) {
       details.clear();
       draw();
     } catch (error) {
-      if (isAbort(error)) return;
-      if (study.filterError(error)) set(body, empty("The filter is not valid"));
-      else if (!quiet)
-        set(
-          body,
-          problem(error, () => load()),
-        );
+      study.failed(body, error, () => load(), { quiet });
     }
   }
 

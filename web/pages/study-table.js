@@ -7,7 +7,7 @@ import { ask, noticeError } from "/parts/dialog.js";
 import { h, set, setText, throttle, uid } from "/parts/dom.js";
 import { cellNode, number } from "/parts/format.js";
 import { readQuery, writeQuery } from "/parts/query.js";
-import { empty, loading, problem } from "/parts/states.js";
+import { empty, loading } from "/parts/states.js";
 import { badge } from "/parts/status.js";
 import { virtualTable } from "/parts/virtual.js";
 
@@ -123,15 +123,7 @@ export async function mount(panel, study) {
       table.resize(items.length, total);
       tell();
     } catch (error) {
-      if (isAbort(error)) return;
-      if (study.filterError(error)) {
-        set(place, empty("The filter is not valid"));
-        setText(count, "");
-      } else if (!quiet)
-        set(
-          place,
-          problem(error, () => load()),
-        );
+      if (study.failed(place, error, () => load(), { quiet })) setText(count, "");
     } finally {
       if (fetching === mine) fetching = null;
     }

@@ -7,7 +7,7 @@ import { count, instant, number } from "/parts/format.js";
 import { filterBox } from "/parts/filter-box.js";
 import { readQuery, writeQuery } from "/parts/query.js";
 import { watchSession } from "/parts/session.js";
-import { fetchPart, guarded, problem } from "/parts/states.js";
+import { empty, fetchPart, guarded, problem } from "/parts/states.js";
 import { announcer, jobWord, progress, remaining, stateBadge } from "/parts/status.js";
 import { studyActions } from "/parts/study-actions.js";
 import { tabs } from "/parts/tabs.js";
@@ -69,6 +69,14 @@ export function mount(root, { params, signal, navigate, setTitle }) {
       where: readQuery().where || "",
       signal,
       filterError: (error) => box.fail(error),
+      /** Shows in `node` why it could not be loaded. True for a mistaken filter, whose words stand above. */
+      failed(node, error, retry, { quiet = false } = {}) {
+        if (isAbort(error)) return false;
+        const mistaken = box.fail(error);
+        if (mistaken) set(node, empty("The filter is not valid"));
+        else if (!quiet) set(node, problem(error, retry));
+        return mistaken;
+      },
       /** True when runs brought metrics that the study did not have when it was loaded. */
       async grown() {
         const known = detail.metrics.length;

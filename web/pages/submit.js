@@ -3,7 +3,7 @@
 
 import { api, isAbort, segment } from "/api.js";
 import { notice } from "/parts/dialog.js";
-import { button, debounce, field, h, select, set } from "/parts/dom.js";
+import { button, debounce, field, h, pageHead, select, set } from "/parts/dom.js";
 import { editor } from "/parts/editor.js";
 import { count, duration } from "/parts/format.js";
 import { planLegend, planView } from "/parts/plan.js";
@@ -86,20 +86,11 @@ export function mount(root, { signal, navigate, setTitle }) {
 
   set(
     root,
-    h(
-      "div",
-      { class: "head" },
-      h(
-        "div",
-        null,
-        h("h1", null, "New study"),
-        h(
-          "p",
-          { class: "muted" },
-          "Scenes, structures, culling tests, and how often each is measured. Checked as you type; nothing runs until you submit.",
-        ),
-      ),
-      h("div", { class: "head-tools" }, examples, go),
+    pageHead(
+      "New study",
+      "Scenes, structures, culling tests, and how often each is measured. Checked as you type; nothing runs until you submit.",
+      examples,
+      go,
     ),
     h(
       "div",

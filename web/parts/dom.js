@@ -139,3 +139,12 @@ export function button(text, onclick, { why, ...attrs } = {}) {
 
 /** A name that may go on in the next line after an underscore, and nowhere else. */
 export const breakable = (name) => name.split(/(?<=_)/).map((part, i) => [i ? h("wbr") : null, part]);
+
+/** The top of a page: its name, what it is for, and beside them what acts on all of it. */
+export const pageHead = (title, about, ...tools) =>
+  h(
+    "div",
+    { class: "head" },
+    h("div", null, h("h1", null, title), about && h("p", { class: "muted" }, about)),
+    tools.length > 0 && h("div", { class: "head-tools" }, tools),
+  );
