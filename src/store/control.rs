@@ -1,10 +1,8 @@
 //! What users do to a study that waits or runs: pause, resume, cancel, retry,
-//! change its priority, delete. And whose turn it is: a study that joins the queue
-//! starts level with those in it, so that it neither waits for all of them nor
-//! they for it (start-time fair queueing: Goyal, Vin and Cheng, 1996; one weight).
+//! change its priority, delete.
 
 use super::submit::retry_failed;
-use super::{Store, compact, now_ms};
+use super::{Store, compact, now_ms, turns};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use sqlx::{Sqlite, Transaction};
@@ -40,67 +38,6 @@ impl StudyState {
     }
 }
 
-/// Jobs of `$1` that wait go to another active study that wants them too, if there is one.
-const HAND_OVER: [&str; 2] = [
-    "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
-     WHERE r.measurement_id = jobs.target AND s.state = 'active' AND s.id <> $1 \
-     ORDER BY s.priority DESC LIMIT 1), study_id) \
-     WHERE study_id = $1 AND kind = 'trial' AND state IN ('queued', 'leased')",
-    "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
-     WHERE r.judgement_id = jobs.target AND s.state = 'active' AND s.id <> $1 \
-     AND s.machine_class = (SELECT machine_class FROM studies WHERE id = $1) \
-     ORDER BY s.priority DESC LIMIT 1), study_id) \
-     WHERE study_id = $1 AND kind = 'judge' AND state IN ('queued', 'leased')",
-];
-
-/// Jobs of `$1` that its matrix does not hold any more go to another study, or end.
-const LET_GO: [&str; 3] = [
-    "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
-     WHERE r.measurement_id = jobs.target AND s.state = 'active' \
-     ORDER BY s.priority DESC LIMIT 1), study_id) \
-     WHERE study_id = $1 AND kind = 'trial' AND state IN ('queued', 'leased') AND target NOT IN \
-     (SELECT measurement_id FROM study_runs WHERE study_id = $1)",
-    "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
-     WHERE r.judgement_id = jobs.target AND s.state = 'active' \
-     AND s.machine_class = (SELECT machine_class FROM studies WHERE id = $1) \
-     ORDER BY s.priority DESC LIMIT 1), study_id) \
-     WHERE study_id = $1 AND kind = 'judge' AND state IN ('queued', 'leased') AND target NOT IN \
-     (SELECT judgement_id FROM study_runs WHERE study_id = $1)",
-    "UPDATE jobs SET state = 'cancelled' WHERE study_id = $1 AND state = 'queued' AND kind IN ('trial', 'judge') \
-     AND target NOT IN (SELECT measurement_id FROM study_runs WHERE study_id = $1) \
-     AND target NOT IN (SELECT judgement_id FROM study_runs WHERE study_id = $1)",
-];
-
-/// Jobs that `$1` wants and that wait for a study that does not want them now. Cancelled
-/// ones of measurements that are still open wait again.
-const TAKE_BACK: [&str; 2] = [
-    "UPDATE jobs SET study_id = $1, state = 'queued' WHERE kind = 'trial' AND state IN ('queued', 'cancelled') \
-     AND target IN (SELECT r.measurement_id FROM study_runs r JOIN measurements m ON m.measurement_id = r.measurement_id \
-     WHERE r.study_id = $1 AND m.status = 'pending') \
-     AND (state = 'cancelled' OR study_id NOT IN (SELECT id FROM studies WHERE state = 'active'))",
-    "UPDATE jobs SET study_id = $1, state = 'queued' WHERE kind = 'judge' AND state IN ('queued', 'cancelled') \
-     AND target IN (SELECT judgement_id FROM study_runs WHERE study_id = $1) \
-     AND (state = 'cancelled' OR study_id NOT IN (SELECT id FROM studies WHERE state = 'active' \
-     AND machine_class = (SELECT machine_class FROM studies WHERE id = $1)))",
-];
-
-/// Jobs that `$1` shares with others wait for the most urgent one that wants them, and for
-/// the one they have waited for among equals.
-const MOST_URGENT: [&str; 2] = [
-    "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
-     WHERE r.measurement_id = jobs.target AND s.state = 'active' \
-     AND s.build_profile = (SELECT build_profile FROM studies WHERE id = jobs.study_id) \
-     AND s.priority > (SELECT priority FROM studies WHERE id = jobs.study_id) ORDER BY s.priority DESC LIMIT 1), study_id) \
-     WHERE (SELECT count(DISTINCT priority) FROM studies WHERE state = 'active') > 1 \
-     AND kind = 'trial' AND state = 'queued' AND target IN (SELECT measurement_id FROM study_runs WHERE study_id = $1)",
-    "UPDATE jobs SET study_id = coalesce((SELECT r.study_id FROM study_runs r JOIN studies s ON s.id = r.study_id \
-     WHERE r.judgement_id = jobs.target AND s.state = 'active' \
-     AND s.machine_class = (SELECT machine_class FROM studies WHERE id = jobs.study_id) \
-     AND s.priority > (SELECT priority FROM studies WHERE id = jobs.study_id) ORDER BY s.priority DESC LIMIT 1), study_id) \
-     WHERE (SELECT count(DISTINCT priority) FROM studies WHERE state = 'active') > 1 \
-     AND kind = 'judge' AND state = 'queued' AND target IN (SELECT judgement_id FROM study_runs WHERE study_id = $1)",
-];
-
 impl Store {
     /// Jobs of the study wait until it is resumed; those under way end.
     ///
@@ -109,7 +46,7 @@ impl Store {
     pub async fn pause(&self, study: &str) -> Result<()> {
         let (id, mut tx) = self.controlled(study).await?;
         set_state(&mut tx, id, StudyState::Paused).await.map_err(|e| self.explain("the study", &e))?;
-        self.run_all(&mut tx, &HAND_OVER, id).await?;
+        turns::hand_over(&mut tx, id).await.map_err(|e| self.explain("the study", &e))?;
         self.commit(tx).await
     }
 
@@ -120,9 +57,9 @@ impl Store {
     pub async fn resume(&self, study: &str) -> Result<()> {
         let (id, mut tx) = self.controlled(study).await?;
         set_state(&mut tx, id, StudyState::Active).await.map_err(|e| self.explain("the study", &e))?;
-        self.run_all(&mut tx, &TAKE_BACK, id).await?;
-        join_the_queue(&mut tx, id).await.map_err(|e| self.explain("the study", &e))?;
-        most_urgent(&mut tx, id).await.map_err(|e| self.explain("the study", &e))?;
+        turns::take_back(&mut tx, id).await.map_err(|e| self.explain("the study", &e))?;
+        turns::join_the_queue(&mut tx, id).await.map_err(|e| self.explain("the study", &e))?;
+        turns::most_urgent(&mut tx, id).await.map_err(|e| self.explain("the study", &e))?;
         self.commit(tx).await
     }
 
@@ -140,7 +77,7 @@ impl Store {
     async fn drop_jobs(&self, tx: &mut Transaction<'static, Sqlite>, id: i64) -> Result<()> {
         let explain = |e: sqlx::Error| self.explain("the study", &e);
         set_state(tx, id, StudyState::Cancelled).await.map_err(explain)?;
-        self.run_all(tx, &HAND_OVER, id).await?;
+        turns::hand_over(tx, id).await.map_err(|e| self.explain("the study", &e))?;
         sqlx::query(
             "UPDATE attempts SET outcome = 'cancelled', ended_ms = $2 WHERE outcome IS NULL AND job_id IN \
              (SELECT id FROM jobs WHERE study_id = $1 AND state = 'leased')",
@@ -164,9 +101,9 @@ impl Store {
         let explain = |e: sqlx::Error| self.explain("the study", &e);
         retry_failed(&mut tx, id).await.map_err(explain)?;
         set_state(&mut tx, id, StudyState::Active).await.map_err(explain)?;
-        self.run_all(&mut tx, &TAKE_BACK, id).await?;
-        join_the_queue(&mut tx, id).await.map_err(explain)?;
-        most_urgent(&mut tx, id).await.map_err(explain)?;
+        turns::take_back(&mut tx, id).await.map_err(|e| self.explain("the study", &e))?;
+        turns::join_the_queue(&mut tx, id).await.map_err(explain)?;
+        turns::most_urgent(&mut tx, id).await.map_err(explain)?;
         self.commit(tx).await
     }
 
@@ -184,7 +121,7 @@ impl Store {
             .execute(&mut *tx)
             .await
             .map_err(|e| self.explain("the study", &e))?;
-        most_urgent(&mut tx, id).await.map_err(|e| self.explain("the study", &e))?;
+        turns::most_urgent(&mut tx, id).await.map_err(|e| self.explain("the study", &e))?;
         self.commit(tx).await
     }
 
@@ -268,35 +205,5 @@ impl Store {
 
 async fn set_state(tx: &mut Transaction<'_, Sqlite>, id: i64, state: StudyState) -> sqlx::Result<()> {
     sqlx::query("UPDATE studies SET state = $2 WHERE id = $1").bind(id).bind(state.word()).execute(&mut **tx).await?;
-    Ok(())
-}
-
-/// After a matrix was replaced.
-pub(super) async fn let_go(tx: &mut Transaction<'_, Sqlite>, id: i64) -> sqlx::Result<()> {
-    for sql in LET_GO {
-        sqlx::query(sql).bind(id).execute(&mut **tx).await?;
-    }
-    Ok(())
-}
-
-/// After priorities, or who wants what, have changed.
-pub(super) async fn most_urgent(tx: &mut Transaction<'_, Sqlite>, id: i64) -> sqlx::Result<()> {
-    for sql in MOST_URGENT {
-        sqlx::query(sql).bind(id).execute(&mut **tx).await?;
-    }
-    Ok(())
-}
-
-/// Level with the least served of those that wait.
-pub(super) async fn join_the_queue(tx: &mut Transaction<'_, Sqlite>, id: i64) -> sqlx::Result<()> {
-    for (column, kind) in [("lane_ms", "trial"), ("beside_ms", "judge")] {
-        let sql = format!(
-            "UPDATE studies SET {column} = max({column}, coalesce((SELECT min(s.{column}) FROM studies s \
-             WHERE s.id <> $1 AND s.state = 'active' \
-             AND s.machine_class = (SELECT machine_class FROM studies WHERE id = $1) AND EXISTS (SELECT 1 FROM jobs j WHERE j.study_id = s.id \
-             AND j.kind = '{kind}' AND j.state = 'queued')), 0)) WHERE id = $1"
-        );
-        sqlx::query(sqlx::AssertSqlSafe(sql)).bind(id).execute(&mut **tx).await?;
-    }
     Ok(())
 }

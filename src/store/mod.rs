@@ -38,6 +38,7 @@ mod series;
 pub mod settle;
 pub mod submit;
 pub mod tokens;
+mod turns;
 pub mod uploads;
 
 use crate::error::{Error, Result};

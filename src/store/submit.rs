@@ -2,7 +2,7 @@
 //! multi-row inserts. What is finished is skipped, also across studies.
 
 use super::rows::{insert_judge_jobs, insert_measurements, insert_trial_jobs};
-use super::{Store, changes, control, now_ms};
+use super::{Store, changes, now_ms, turns};
 use crate::error::Result;
 use crate::record::{RepeatPolicy, RunSpec};
 use crate::results::Excluded;
@@ -116,7 +116,7 @@ fn ids_of(spec: &RunSpec, machine_class: &str) -> Ids {
 async fn submit(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]) -> sqlx::Result<Submitted> {
     let blocks = blocks(&s.cells);
     let study_id = put_study(tx, s, ids, &blocks).await?;
-    control::let_go(tx, study_id).await?;
+    turns::let_go(tx, study_id).await?;
     if s.retry_failed {
         retry_failed(tx, study_id).await?;
     }
@@ -172,7 +172,7 @@ async fn submit(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]) -
     insert_measurements(tx, s, ids, &new).await?;
     out.jobs_added += insert_judge_jobs(tx, study_id, ids, &blocks, &judge).await?;
     out.jobs_added += insert_trial_jobs(tx, study_id, s, ids, &blocks, &open).await?;
-    control::most_urgent(tx, study_id).await?;
+    turns::most_urgent(tx, study_id).await?;
     Ok(out)
 }
 
@@ -243,7 +243,7 @@ async fn put_study(tx: &mut Transaction<'_, Sqlite>, s: &Submission, ids: &[Ids]
     .bind(s.cells.first().map_or("", |c| c.spec.protocol.build_profile.as_str()))
     .fetch_one(&mut **tx)
     .await?;
-    control::join_the_queue(tx, study_id).await?;
+    turns::join_the_queue(tx, study_id).await?;
     if before.is_some_and(|(_, hash)| hash == runs_hash) {
         return Ok(study_id);
     }
