@@ -9,7 +9,7 @@ use super::problem::{Answer, Problem};
 use super::state::Shared;
 use crate::claim::Claim;
 use crate::report::labels::Grid;
-use crate::report::{charts, claims, figure, render, sweep_chart, sweeps};
+use crate::report::{charts, claims, figure, raster, render, sweep_chart, sweeps};
 use crate::results::StudyResults;
 use axum::extract::{OriginalUri, State};
 use axum::http::{HeaderMap, header};
@@ -121,7 +121,7 @@ pub async fn chart(
             return Err(Problem::missing(format!("the study has no chart `{name}`"))
                 .help(format!("it has: {}", known.join(", "))));
         };
-        Ok(if suffix == "svg" { render::svg(figure, true)?.into_bytes() } else { render::png(figure)? })
+        Ok(if suffix == "svg" { render::svg(figure, true)?.into_bytes() } else { raster::png(figure)? })
     });
     let kind = if chart.ends_with(".svg") { "image/svg+xml" } else { "image/png" };
     Ok(caching::tagged(([(header::CONTENT_TYPE, kind)], drawn.await?).into_response(), &tag))

@@ -76,7 +76,6 @@ pub async fn compare_route(
     let answer = compute(move || {
         let pairs = compare::compare(&first, &second, &metric).map_err(|e| e.key("metric"))?;
         let shown = metrics::known(if metric == PAIRED { "median_frame_us" } else { &metric });
-
         let mut counts: HashMap<&'static str, usize> =
             ["lower", "higher", "same", "unknown", "none"].into_iter().map(|w| (w, 0)).collect();
         let mut lines = Vec::new();

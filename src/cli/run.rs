@@ -143,7 +143,7 @@ async fn report(store: &Store, study_id: i64, name: &str, claims: &[Claim], out:
     let results = store.results_with(name, Detail::Frames).await?;
     let series = store.all_series(name, Detail::Frames).await?;
     let files = crate::report::write_with_series(&results, claims, &series, out)?;
-    store.record_artifacts(study_id, out, &key).await?;
+    store.record_artifacts(study_id, &files.all(), &key).await?;
     Ok(files.page)
 }
 

@@ -31,6 +31,7 @@ pub mod page;
 mod pairs;
 pub mod pareto;
 pub mod query;
+pub mod raster;
 pub mod render;
 pub mod repeatability;
 pub mod repeatability_tables;
@@ -57,6 +58,12 @@ pub struct Files {
     pub page: PathBuf,
     pub charts: Vec<PathBuf>,
     pub tables: Vec<PathBuf>,
+}
+
+impl Files {
+    pub fn all(&self) -> Vec<PathBuf> {
+        self.charts.iter().chain(&self.tables).chain([&self.page]).cloned().collect()
+    }
 }
 
 /// Writes `index.html`, `charts/*.{svg,png}` and `tables/*.{csv,md,tex}` below `out_dir`.
@@ -108,7 +115,7 @@ pub fn write_with_series(
     let base = out_dir.join("charts");
     let drawn = figures.par_iter().map(|figure| {
         let svg = save(&base.join(format!("{}.svg", figure.id)), render::svg(figure, true)?.as_bytes())?;
-        let png = save(&base.join(format!("{}.png", figure.id)), &render::png(figure)?)?;
+        let png = save(&base.join(format!("{}.png", figure.id)), &raster::png(figure)?)?;
         Ok(([svg, png], render::svg(figure, false)?))
     });
     for (paths, svg) in drawn.collect::<Result<Vec<_>>>()? {

@@ -1,4 +1,4 @@
-//! A [`Figure`] to SVG and PNG through plotters' two backends.
+//! A [`Figure`] to SVG through plotters, and what drawing one on any of its backends takes.
 
 use super::figure::{Anchor, Figure, Mark, TextStyle};
 use super::font;
@@ -11,10 +11,6 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 /// plotters places by whole pixels, even in SVG: everything is drawn this much
 /// larger and the view box scales it back, or curves would wobble.
 const SVG_FINE: f64 = 10.0;
-/// PNG pixels a figure pixel.
-const PNG_SCALE: usize = 2;
-/// Samples a PNG pixel and axis: plotters smooths only hairlines by itself.
-const PNG_SAMPLES: usize = 2;
 
 /// The SVG text. `paper` paints the background, for files that stand alone.
 pub fn svg(figure: &Figure, paper: bool) -> Result<String> {
@@ -113,58 +109,9 @@ fn trim_text(body: &str) -> String {
     out
 }
 
-/// An RGB PNG at twice the figure's size.
-pub fn png(figure: &Figure) -> Result<Vec<u8>> {
-    font::register();
-    let scale = PNG_SCALE * PNG_SAMPLES;
-    let size = |x: f64| (x.ceil() as usize) * PNG_SCALE;
-    let (w, h) = (size(figure.width), size(figure.height));
-    // White from the start: the paper needs no painting.
-    let mut fine = vec![255u8; 3 * w * h * PNG_SAMPLES * PNG_SAMPLES];
-    {
-        let size = ((w * PNG_SAMPLES) as u32, (h * PNG_SAMPLES) as u32);
-        let root = BitMapBackend::with_buffer(&mut fine, size).into_drawing_area();
-        let marks = (figure.id.as_str(), &figure.marks[..]);
-        draw(marks, &root, scale as f64, font::HEIGHT_EM, Baseline::HalfSizeBelow, false)?;
-    }
-    let pixels = average(&fine, w, h);
-    let mut out = Vec::new();
-    let bad = |e: png::EncodingError| Error::new(format!("cannot encode {}.png: {e}", figure.id));
-    let mut encoder = png::Encoder::new(&mut out, w as u32, h as u32);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    // Of drawings with large even areas: smaller than the usual setting, in half its time.
-    encoder.set_filter(png::Filter::NoFilter);
-    encoder.set_deflate_compression(png::DeflateCompression::Level(4));
-    // 2 pixels a figure pixel of 1/96 inch.
-    let per_metre = (96.0 * PNG_SCALE as f64 / 0.0254).round() as u32;
-    encoder.set_pixel_dims(Some(png::PixelDimensions { xppu: per_metre, yppu: per_metre, unit: png::Unit::Meter }));
-    let mut writer = encoder.write_header().map_err(bad)?;
-    writer.write_image_data(&pixels).map_err(bad)?;
-    writer.finish().map_err(bad)?;
-    Ok(out)
-}
-
-/// Mean of each square of samples.
-fn average(fine: &[u8], w: usize, h: usize) -> Vec<u8> {
-    const { assert!(PNG_SAMPLES == 2) };
-    let mut out = Vec::with_capacity(3 * w * h);
-    for rows in fine.chunks_exact(2 * 6 * w) {
-        let (upper, lower) = rows.split_at(6 * w);
-        for (u, l) in upper.chunks_exact(6).zip(lower.chunks_exact(6)) {
-            let mean = |c: usize| {
-                let sum = [u[c], u[c + 3], l[c], l[c + 3]].map(u32::from);
-                (sum.iter().sum::<u32>() / 4) as u8
-            };
-            out.extend([mean(0), mean(1), mean(2)]);
-        }
-    }
-    out
-}
-
 /// Where a backend puts text whose anchor is the bottom.
 #[derive(Clone, Copy, PartialEq)]
-enum Baseline {
+pub(super) enum Baseline {
     /// SVG, once `dy` is removed.
     AtAnchor,
     /// The rasteriser puts the baseline half a size below the top of the text.
@@ -177,8 +124,8 @@ fn rgba(c: Colour, alpha: f64) -> RGBAColor {
 
 type Area<'a, B> = DrawingArea<B, plotters::coord::Shift>;
 
-fn draw<B: DrawingBackend>(
-    (id, marks): (&str, &[Mark]),
+pub(super) fn draw<'m, B: DrawingBackend>(
+    (id, marks): (&str, impl IntoIterator<Item = &'m Mark>),
     root: &Area<'_, B>,
     scale: f64,
     height_em: f64,

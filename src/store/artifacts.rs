@@ -30,8 +30,7 @@ impl Store {
         .fetch_all(&self.readers)
         .await
         .map_err(|e| self.explain("reading the studies", &e))?;
-        let folder = std::path::absolute(folder).map_err(|e| Error::io(folder, "it cannot be named", &e))?;
-        let made_of = serde_json::to_vec(&(program(), study_id, folder, series)).expect("plain data");
+        let made_of = serde_json::to_vec(&(program(), study_id, absolute(folder)?, series)).expect("plain data");
         Ok(blake3::hash(&made_of).to_hex().to_string())
     }
 
@@ -53,17 +52,17 @@ impl Store {
         Ok(!files.is_empty() && files.iter().all(same))
     }
 
-    /// Records every file below `folder` as made by the study; earlier entries of it are replaced.
-    /// `key` is the [`Store::report_key`] of before the files were written.
+    /// Records files as made by the study; earlier entries of it are replaced. `key` is the
+    /// [`Store::report_key`] of before they were written.
     ///
     /// # Errors
     /// When a file cannot be read or the database fails.
-    pub async fn record_artifacts(&self, study_id: i64, folder: &Path, key: &str) -> Result<usize> {
-        let folder = std::path::absolute(folder).map_err(|e| Error::io(folder, "it cannot be named", &e))?;
+    pub async fn record_artifacts(&self, study_id: i64, paths: &[PathBuf], key: &str) -> Result<()> {
         let mut files = Vec::new();
-        for path in files_below(&folder)? {
-            let bytes = std::fs::read(&path).map_err(|e| Error::io(&path, "it cannot be read back", &e))?;
-            files.push((path.display().to_string(), bytes.len() as i64, blake3::hash(&bytes).to_hex().to_string()));
+        for path in paths {
+            let bytes = std::fs::read(path).map_err(|e| Error::io(path, "it cannot be read back", &e))?;
+            let hash = blake3::hash(&bytes).to_hex().to_string();
+            files.push((absolute(path)?.display().to_string(), bytes.len() as i64, hash));
         }
         let explain = |e: sqlx::Error| self.explain("the list of files", &e);
         let mut tx = self.begin("the list of files").await?;
@@ -91,8 +90,7 @@ impl Store {
             .execute(&mut *tx)
             .await
             .map_err(explain)?;
-        tx.commit().await.map_err(explain)?;
-        Ok(files.len())
+        tx.commit().await.map_err(explain)
     }
 
     /// The files recorded for a study, by path.
@@ -118,16 +116,7 @@ fn program() -> Option<(PathBuf, u64, std::time::SystemTime)> {
     Some((exe, about.len(), modified))
 }
 
-fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut out = Vec::new();
-    let mut folders = vec![folder.to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        let entries = std::fs::read_dir(&folder).map_err(|e| Error::io(&folder, "the folder cannot be read", &e))?;
-        for entry in entries {
-            let path = entry.map_err(|e| Error::io(&folder, "the folder cannot be read", &e))?.path();
-            if path.is_dir() { folders.push(path) } else { out.push(path) }
-        }
-    }
-    out.sort();
-    Ok(out)
+/// Wherever a later run is started from.
+fn absolute(path: &Path) -> Result<PathBuf> {
+    std::path::absolute(path).map_err(|e| Error::io(path, "it cannot be named", &e))
 }

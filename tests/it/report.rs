@@ -26,7 +26,7 @@ use cullmark::report::filter::Filter;
 use cullmark::report::labels::Grid;
 use cullmark::report::metrics::known;
 use cullmark::report::query::{Format, Query, print, query};
-use cullmark::report::{self, charts, claims, render, tables};
+use cullmark::report::{self, charts, claims, raster, render, tables};
 use cullmark::results::{RunStatus, StudyResults};
 use std::path::Path;
 
@@ -121,7 +121,7 @@ fn nothing_overlaps_with_seven_scenes_and_twelve_combinations() {
 fn a_png_can_be_decoded_and_shows_something() {
     let results = fixture::sized(&fixture::SCENES[..1], 40, 2);
     let figure = &figures(&results)[0];
-    let bytes = render::png(figure).unwrap();
+    let bytes = raster::png(figure).unwrap();
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     let info = reader.next_frame(&mut pixels).unwrap();
