@@ -115,7 +115,7 @@ impl Spec {
         for param in params {
             match param.default {
                 Default::Axis(_) => {}
-                Default::Optional(_) => {
+                Default::Later(_) => {
                     if out.params.get(param.name) == Some(&param.default.value()) {
                         out.params.remove(param.name);
                     }
@@ -156,11 +156,6 @@ impl Spec {
             Some(Value::Text(s)) => s,
             other => panic!("unresolved spec: {}.{key} is {other:?}", self.kind),
         }
-    }
-
-    /// The same for [`Default::Optional`]: `None` is the default.
-    pub fn optional_text(&self, key: &str) -> Option<&str> {
-        self.params.contains_key(key).then(|| self.text(key))
     }
 
     /// The spec without parameters that have their default: short labels for charts.
@@ -239,9 +234,9 @@ pub enum Default {
     Bool(bool),
     /// The first choice is the default.
     Choice(&'static [&'static str]),
-    /// The same, but [`Spec::resolve`] leaves the default out, given or not: for a
-    /// parameter that came after runs were stored, whose ids must not change.
-    Optional(&'static [&'static str]),
+    /// Any of the others, but [`Spec::resolve`] leaves the default out, given or not: for
+    /// a parameter that came after runs were stored, whose ids must not change.
+    Later(&'static Default),
     /// One of these names. Not given, it is taken from the axis of the same name,
     /// and [`Spec::resolve`] leaves it out.
     Axis(&'static [&'static str]),
@@ -253,8 +248,19 @@ impl Default {
             Default::Int { value, .. } => Value::Int(*value),
             Default::Float { value, .. } => Value::Float(*value),
             Default::Bool(b) => Value::Bool(*b),
-            Default::Choice(c) | Default::Optional(c) => Value::Text(c[0].to_string()),
+            Default::Choice(c) => Value::Text(c[0].to_string()),
+            Default::Later(d) => d.value(),
             Default::Axis(_) => Value::Text("the axis' value".to_string()),
+        }
+    }
+}
+
+impl Default {
+    /// What is allowed, whenever it came.
+    pub fn plain(&self) -> &Default {
+        match self {
+            Default::Later(d) => d.plain(),
+            other => other,
         }
     }
 }
@@ -263,7 +269,8 @@ impl Param {
     fn check(&self, value: &Value) -> Result<Value> {
         let name = self.name;
         let wrong = |want: String| Err(Error::new(format!("is {value}, but must be {want}")).key(name));
-        match (&self.default, value) {
+        match (self.default.plain(), value) {
+            (Default::Later(_), _) => unreachable!("`plain` looks into it"),
             (Default::Int { min, max, .. }, Value::Int(i)) if (min..=max).contains(&i) => Ok(value.clone()),
             (Default::Int { min, max, .. }, _) => wrong(format!("a whole number from {min} to {max}")),
             (Default::Float { min, max, .. }, Value::Float(x)) if (min..=max).contains(&x) => Ok(value.clone()),
@@ -274,12 +281,10 @@ impl Param {
             (Default::Bool(_), Value::Bool(_)) => Ok(value.clone()),
             (Default::Bool(_), _) => wrong("true or false".to_string()),
             // By its printed form, so that a choice may be a number: `sectors=8`.
-            (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _)
-                if c.contains(&value.to_string().as_str()) =>
-            {
+            (Default::Choice(c) | Default::Axis(c), _) if c.contains(&value.to_string().as_str()) => {
                 Ok(Value::Text(value.to_string()))
             }
-            (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _) => {
+            (Default::Choice(c) | Default::Axis(c), _) => {
                 let list = c.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
                 let near = did_you_mean(&value.to_string(), c.iter().copied());
                 let mut e = Error::new(format!("is {value}, but must be one of {list}")).key(name);
@@ -297,8 +302,19 @@ pub struct Entry<T: ?Sized> {
     /// Raised when the submitted sets change; part of `answer_id`.
     pub revision: u32,
     pub params: &'static [Param],
-    /// Called with a resolved spec only.
+    /// Called by [`Entry::build`] alone, with every parameter present.
     pub make: fn(&Spec) -> Box<T>,
+}
+
+impl<T: ?Sized> Entry<T> {
+    /// Makes what `resolved`, a resolved spec, says.
+    pub fn build(&self, resolved: &Spec) -> Box<T> {
+        let mut all = resolved.clone();
+        for param in self.params.iter().filter(|p| matches!(p.default, Default::Later(_))) {
+            all.params.entry(param.name.to_string()).or_insert_with(|| param.default.value());
+        }
+        (self.make)(&all)
+    }
 }
 
 /// Finds and checks: unknown names come back with a suggestion.
@@ -348,19 +364,19 @@ mod tests {
     }
 
     #[test]
-    fn an_optional_choice_is_named_only_where_it_is_not_the_default() {
+    fn a_later_parameter_is_named_only_where_it_is_not_the_default() {
         static PARAMS: &[Param] = &[
             Param { name: "cells", default: Default::Int { value: 4, min: 1, max: 18 }, about: "" },
-            Param { name: "rays", default: Default::Optional(&["view", "node"]), about: "" },
+            Param { name: "rays", default: Default::Later(&Default::Choice(&["view", "node"])), about: "" },
         ];
         let resolved = |text: &str| Spec::parse(text).unwrap().resolve(PARAMS);
         for text in ["normal_mask", "normal_mask:rays=view"] {
             let spec = resolved(text).unwrap();
-            assert_eq!((spec.to_string().as_str(), spec.optional_text("rays")), ("normal_mask:cells=4", None));
+            assert_eq!(spec.to_string(), "normal_mask:cells=4");
         }
         let spec = resolved("normal_mask:rays=node").unwrap();
         assert_eq!(spec.to_string(), "normal_mask:cells=4,rays=node");
-        assert_eq!((spec.label(PARAMS).as_str(), spec.optional_text("rays")), ("normal_mask:rays=node", Some("node")));
+        assert_eq!((spec.label(PARAMS).as_str(), spec.text("rays")), ("normal_mask:rays=node", "node"));
         let e = resolved("normal_mask:rays=nodes").unwrap_err();
         assert_eq!(e.help.as_deref(), Some("did you mean \"node\"?"));
     }

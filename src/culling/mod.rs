@@ -340,7 +340,7 @@ pub fn make_tests_in(specs: &[Spec], arithmetic: Arithmetic) -> Result<Sum> {
         let (entry, spec) = find("culling test", TESTS, spec)?;
         let mut own = spec.clone();
         state_arithmetic(&mut own, arithmetic);
-        tests.push((entry.make)(&own));
+        tests.push(entry.build(&own));
         resolved.push(spec);
     }
     Ok((tests, resolved))
@@ -377,7 +377,7 @@ pub fn arithmetic_of(spec: &Spec) -> Arithmetic {
 
 pub fn make_walk(spec: &Spec) -> Result<(Box<dyn Walk>, Spec)> {
     let (entry, resolved) = find("walk", WALKS, spec)?;
-    Ok(((entry.make)(&resolved), resolved))
+    Ok((entry.build(&resolved), resolved))
 }
 
 /// Class and entitlement of a sum of tests: the weakest class, the union of sets.

@@ -50,12 +50,12 @@ pub const ENTRY: Entry<dyn Test> = Entry {
         },
         Param {
             name: "rays",
-            default: Allowed::Optional(&["view", "node"]),
+            default: Allowed::Later(&Allowed::Choice(&["view", "node"])),
             about: "what a cell is averted from: all rays of the view, or only those from the eye to the node's box",
         },
     ],
     make: |spec| {
-        let local = spec.optional_text("rays") == Some("node");
+        let local = spec.text("rays") == "node";
         Box::new(NormalMask::new(spec.int("cells") as usize).with_rays_to_nodes(local))
     },
 };

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result, did_you_mean};
 use crate::math::{Arithmetic, Camera, arithmetic};
 use crate::record::cameras::{self, CAMERAS};
-use crate::registry::{Entry, Param, Spec, find};
+use crate::registry::{Entry, Param, Spec, Value, find};
 use crate::{culling, structure};
 
 /// An axis other than `scene` and `path`, whose values are the manifest's own.
@@ -94,9 +94,15 @@ pub static AXES: &[Axis] = &[
     },
 ];
 
-/// A list has no hierarchy to walk: every block is judged.
+/// What has no hierarchy (a list, a grid of cells) is judged block by block; portals
+/// are there to be looked through.
 fn walk_for(structure: &Spec) -> Spec {
-    let spec = Spec::new(if structure.kind == "list" { "flat" } else { "depth_first" });
+    let is_flat = structure.kind == "list" || structure.params.get("layout") == Some(&Value::Text("flat".into()));
+    let spec = Spec::new(match structure.kind.as_str() {
+        _ if is_flat => "flat",
+        "portal_octree" => "portals",
+        _ => "depth_first",
+    });
     find("walk", culling::WALKS, &spec).map_or(spec, |(_, s)| s)
 }
 

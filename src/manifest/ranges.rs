@@ -58,7 +58,7 @@ enum Scale {
 const MAX_STEPS: u32 = 10_000;
 
 fn range(f: &mut Fields, param: &Param) -> Vec<Value> {
-    let whole = match param.default {
+    let whole = match param.default.plain() {
         Default::Int { .. } => true,
         Default::Float { .. } => false,
         _ => {

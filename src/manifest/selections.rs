@@ -112,24 +112,19 @@ fn check(part: &Part, axis: Option<&'static Axis>, what: &str, names: Option<&[S
 
 /// Why a parameter cannot have `value`, as a help sentence.
 fn mismatch(default: &Default, value: &Value) -> Option<String> {
-    match (default, value) {
+    if matches!(default, Default::Later(d) if d.value() == *value) {
+        return Some(format!("{value} is the default, which parts do not name: leave the condition out"));
+    }
+    match (default.plain(), value) {
+        (Default::Later(_), _) => unreachable!("`plain` looks into it"),
         (Default::Int { min, max, .. }, Value::Int(i)) if (min..=max).contains(&i) => None,
         (Default::Int { min, max, .. }, _) => Some(format!("it is a whole number from {min} to {max}")),
         (Default::Float { .. }, Value::Int(_) | Value::Float(_)) => None,
         (Default::Float { min, max, .. }, _) => Some(format!("it is a number from {min} to {max}")),
         (Default::Bool(_), Value::Bool(_)) => None,
         (Default::Bool(_), _) => Some("it is true or false".into()),
-        (Default::Optional(c), _) if value.to_string() == c[0] => {
-            Some(format!("{} is the default, which parts do not name: leave the condition out", c[0]))
-        }
-        (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _)
-            if c.contains(&value.to_string().as_str()) =>
-        {
-            None
-        }
-        (Default::Choice(c) | Default::Optional(c) | Default::Axis(c), _) => {
-            Some(format!("it is one of {}", c.join(", ")))
-        }
+        (Default::Choice(c) | Default::Axis(c), _) if c.contains(&value.to_string().as_str()) => None,
+        (Default::Choice(c) | Default::Axis(c), _) => Some(format!("it is one of {}", c.join(", "))),
     }
 }
 

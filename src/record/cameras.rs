@@ -103,7 +103,7 @@ pub fn check(spec: &Spec) -> Result<Spec> {
 /// As [`check`], and a far plane that is not beyond the near one.
 pub fn camera_of(spec: &Spec) -> Result<Camera> {
     let (entry, resolved) = find(AXIS, CAMERAS, spec)?;
-    let camera = *(entry.make)(&resolved);
+    let camera = *entry.build(&resolved);
     match camera.far_m {
         Some(far_m) if far_m <= camera.near_m => Err(Error::new(format!(
             "`{spec}` has its far plane at {far_m} m, not beyond the near plane at {} m",

@@ -16,7 +16,6 @@
 
 mod choose;
 mod plane;
-mod wide;
 
 use super::Structure;
 use super::builder::piece::Piece;
@@ -295,7 +294,7 @@ impl Bsp {
         }
         let stats = builder::stats(&nodes, u64::from(self.min_leaf));
         if self.wide {
-            nodes = wide::collapse(&nodes);
+            nodes = builder::collapse::collapse(&nodes);
         }
         let pieces = || leaves.iter().flat_map(|(_, pieces)| pieces);
         let entries = pieces().map(|p| p.triangle).collect();

@@ -25,5 +25,5 @@ pub static ALL: &[Entry<dyn Structure>] = &[bsp::ENTRY, list::ENTRY, octree::ENT
 /// The structure that `spec` names, with the spec's defaults filled in.
 pub fn make(spec: &Spec) -> Result<(Box<dyn Structure>, Spec)> {
     let (entry, resolved) = find("structure", ALL, spec)?;
-    Ok(((entry.make)(&resolved), resolved))
+    Ok((entry.build(&resolved), resolved))
 }

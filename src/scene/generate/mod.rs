@@ -57,5 +57,5 @@ pub fn make(spec: &Spec) -> Result<(Box<dyn Generator>, Spec)> {
             .key("triangles")
             .help(format!("give {least} or more, or 0 for the published count")));
     }
-    Ok(((entry.make)(&resolved), resolved))
+    Ok((entry.build(&resolved), resolved))
 }

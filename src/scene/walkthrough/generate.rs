@@ -124,7 +124,7 @@ pub static ALL: &[Entry<dyn Walker>] = &[
 /// The walker that `spec` names, with the spec's defaults filled in.
 pub fn make(spec: &Spec) -> Result<(Box<dyn Walker>, Spec)> {
     let (entry, resolved) = find("walkthrough", ALL, spec)?;
-    Ok(((entry.make)(&resolved), resolved))
+    Ok((entry.build(&resolved), resolved))
 }
 
 fn empty() -> Error {

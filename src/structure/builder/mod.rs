@@ -1,6 +1,7 @@
 //! What the builders share: a tree of nodes in one array, and its flattening
 //! into the 8-wide blocks of [`Hierarchy`].
 
+pub mod collapse;
 pub mod cut;
 pub mod morton;
 pub mod piece;
@@ -110,21 +111,28 @@ pub fn stats(nodes: &[Node], leaf_limit: u64) -> BuildStats {
     s
 }
 
-/// Writes the tree as blocks of siblings. Blocks come in depth-first order, the
-/// order in which a walk reads them. `nodes[0]` is the root and must have
-/// bounds, as all others.
+/// [`flatten_forest`] of the tree whose root is `nodes[0]`.
 pub fn flatten(scene: &Scene, nodes: &[Node], entries: Vec<u32>, fragments: Option<Vec<[DVec3; 3]>>) -> Hierarchy {
+    flatten_forest(scene, nodes, nodes.len().min(1), entries, fragments)
+}
+
+/// Writes trees as blocks of siblings. Blocks of roots come first, eight roots each,
+/// then all others in depth-first order, the order in which a walk reads them.
+/// `nodes[..roots]` are the roots, in the order of their entries; every node has bounds.
+pub fn flatten_forest(
+    scene: &Scene,
+    nodes: &[Node],
+    roots: usize,
+    entries: Vec<u32>,
+    fragments: Option<Vec<[DVec3; 3]>>,
+) -> Hierarchy {
     let mut h = Hierarchy { origin: scene.origin, entries, fragments, ..Default::default() };
     h.number_material_runs(scene);
-    if nodes.is_empty() {
-        return h;
-    }
-    h.root_blocks = 1;
+    h.root_blocks = roots.div_ceil(LANES) as u32;
     let with_planes = nodes.iter().any(|n| n.half_space.is_some());
     let mut planes = Vec::new();
-    // Node range of a group of siblings, and the flat name of its parent.
-    let mut pending = vec![(0..1usize, NONE)];
-    while let Some((group, parent)) = pending.pop() {
+    let groups: Vec<_> = (0..roots).step_by(LANES).map(|i| i..(i + LANES).min(roots)).collect();
+    let mut write = |group: std::ops::Range<usize>, parent: u32, pending: &mut Vec<(std::ops::Range<usize>, u32)>| {
         let block = h.links.len();
         let (mut bounds, mut links) = (BoundsBlock::EMPTY, LinkBlock::EMPTY);
         debug_assert!(group.len() <= LANES, "a group is one block");
@@ -149,6 +157,18 @@ pub fn flatten(scene: &Scene, nodes: &[Node], entries: Vec<u32>, fragments: Opti
             if !node.is_leaf() {
                 pending.push((node.children(), (block * LANES + lane) as u32));
             }
+        }
+    };
+    // Node range of a group of siblings, and the flat name of its parent.
+    let mut below: Vec<Vec<_>> = Vec::with_capacity(groups.len());
+    for group in groups {
+        let mut pending = Vec::new();
+        write(group, NONE, &mut pending);
+        below.push(pending);
+    }
+    for mut pending in below {
+        while let Some((group, parent)) = pending.pop() {
+            write(group, parent, &mut pending);
         }
     }
     h.half_spaces = with_planes.then_some(planes);
