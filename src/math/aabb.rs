@@ -73,6 +73,13 @@ impl Box32 {
         !(self.lo.cmple(self.hi).all())
     }
 
+    /// Half of the surface; 0 if empty. A large box is the likeliest to be asked about
+    /// without being decided.
+    pub fn half_area(&self) -> f32 {
+        let s = (self.hi - self.lo).max(Vec3::ZERO);
+        s.x * s.y + s.y * s.z + s.z * s.x
+    }
+
     pub fn contains_box(&self, o: &Box32) -> bool {
         o.is_empty() || (self.lo.cmple(o.lo).all() && o.hi.cmple(self.hi).all())
     }

@@ -241,20 +241,31 @@ impl Block {
 
 /// A combination that cannot be what it says, known before anything is built.
 struct Impossible {
-    /// The part to blame, for structure, culling and walk.
-    strikes: fn(&Spec, &[Spec], &Spec) -> Option<Spec>,
+    /// Of structure, culling and walk: an exclude that would leave such cells out, if this is one.
+    strikes: fn(&Spec, &[Spec], &Spec) -> Option<String>,
     why: &'static str,
     help: &'static str,
 }
 
-static IMPOSSIBLE: &[Impossible] = &[Impossible {
-    strikes: |structure, culling, _| {
-        let by_plane = |s: &&Spec| matches!(s.params.get("node_test"), Some(Value::Text(t)) if t != "box");
-        culling.iter().find(by_plane).filter(|_| structure.kind != "bsp").cloned()
+static IMPOSSIBLE: &[Impossible] = &[
+    Impossible {
+        strikes: |structure, culling, _| {
+            let by_plane = |s: &&Spec| matches!(s.params.get("node_test"), Some(Value::Text(t)) if t != "box");
+            let part = culling.iter().find(by_plane).filter(|_| structure.kind != "bsp")?;
+            Some(format!("structure = \"{}\", culling = \"{}:node_test!=box+*\"", structure.kind, part.kind))
+        },
+        why: "only `bsp` has partition planes for `node_test` to judge by",
+        help: "keep node_test = \"box\" for other structures",
     },
-    why: "only `bsp` has partition planes for `node_test` to judge by",
-    help: "keep node_test = \"box\" for other structures",
-}];
+    Impossible {
+        strikes: |structure, _, walk| {
+            let strikes = walk.kind == "portals" && structure.kind != "portal_octree";
+            strikes.then(|| format!("structure = \"{}\", walk = \"portals\"", structure.kind))
+        },
+        why: "only `portal_octree` has portals to look through",
+        help: "give the walk to it alone, in an [[include]], or leave it to `walk = \"auto\"`",
+    },
+];
 
 /// Notes every kind of impossible cell once, with an exclude that would silence it.
 pub fn impossible(manifest: &Manifest, pool: &Pool, cells: &[Cell], mistakes: &Mistakes) {
@@ -263,18 +274,13 @@ pub fn impossible(manifest: &Manifest, pool: &Pool, cells: &[Cell], mistakes: &M
     for rule in IMPOSSIBLE {
         let value = |cell: &Cell, i: usize| pool.value(cell.values[i]).clone();
         let strike = |cell: &Cell| (rule.strikes)(&value(cell, s)[0], &value(cell, c), &value(cell, w)[0]);
-        let struck: Vec<(&Cell, Spec)> = cells.iter().filter_map(|cell| Some((cell, strike(cell)?))).collect();
-        let Some((first, part)) = struck.first() else { continue };
-        let cell = format!(
-            "{} × {}",
-            super::labels::label("structure", &value(first, s)),
-            super::labels::label("culling", &value(first, c))
-        );
+        let struck: Vec<(&Cell, String)> = cells.iter().filter_map(|cell| Some((cell, strike(cell)?))).collect();
+        let Some((first, exclude)) = struck.first() else { continue };
+        let label = |axis: &str, i: usize| super::labels::label(axis, &value(first, i));
+        let cell = format!("{} × {} × {}", label("structure", s), label("culling", c), label("walk", w));
         let many =
             if struck.len() == 1 { "an impossible cell".into() } else { format!("{} impossible cells", struck.len()) };
         let e = Error::new(format!("has {many}, such as {cell}: {}", rule.why));
-        let kind = &value(first, s)[0].kind;
-        let exclude = format!("structure = \"{kind}\", culling = \"{}:node_test!=box+*\"", part.kind);
         mistakes.note(
             &manifest.matrix_place,
             "matrix",

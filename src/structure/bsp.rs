@@ -60,6 +60,11 @@ pub const ENTRY: Entry<dyn Structure> = Entry {
             about: "pieces on which candidates are compared",
         },
         Param {
+            name: "heuristic",
+            default: Default::Later(&Default::Choice(&["balance", "surface"])),
+            about: "what a plane should do: balance the pieces, or leave little surface around many of them",
+        },
+        Param {
             name: "layout",
             default: Default::Choice(&["wide", "binary"]),
             about: "wide: collapsed into groups of 8; binary: the paper's tree, with its order from front to back",
@@ -72,6 +77,7 @@ pub const ENTRY: Entry<dyn Structure> = Entry {
             axis_penalty: spec.float("axis_penalty"),
             candidates: spec.int("candidates") as u32,
             sample: spec.int("sample") as u32,
+            surface: spec.text("heuristic") == "surface",
             wide: spec.text("layout") == "wide",
         })
     },
@@ -98,6 +104,8 @@ pub struct Bsp {
     pub axis_penalty: f64,
     pub candidates: u32,
     pub sample: u32,
+    /// Surface areas in place of balance.
+    pub surface: bool,
     /// Collapse the binary tree into groups of up to 8.
     pub wide: bool,
 }

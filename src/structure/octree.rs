@@ -16,8 +16,8 @@
 
 use super::Structure;
 use super::builder::morton::{Lattice, interleave, radix_sort};
-use super::builder::{self, Node, cut};
-use crate::error::Result;
+use super::builder::{self, Node, cut, facing};
+use crate::error::{Error, Result};
 use crate::hierarchy::Hierarchy;
 use crate::math::{Aabb, Box32, DVec3};
 use crate::registry::{Default, Entry, Param};
@@ -49,6 +49,11 @@ pub const ENTRY: Entry<dyn Structure> = Entry {
             default: Default::Int { value: 0, min: 0, max: 1 << 30 },
             about: "nodes with at most so many triangles are not divided; 0 always divides down to the depth",
         },
+        Param {
+            name: "leaves",
+            default: Default::Later(&Default::Choice(&["whole", "facing"])),
+            about: "facing: divided once more, by where their triangles face (policies L and E)",
+        },
     ],
     make: |spec| {
         let policy = match spec.text("policy") {
@@ -62,6 +67,7 @@ pub const ENTRY: Entry<dyn Structure> = Entry {
             policy,
             cube: spec.text("root") == "cube",
             leaf_limit: spec.int("leaf_limit") as u32,
+            by_facing: spec.text("leaves") == "facing",
         })
     },
 };
@@ -85,11 +91,18 @@ pub struct Octree {
     pub cube: bool,
     /// 0: divide down to `depth`.
     pub leaf_limit: u32,
+    /// Leaves are divided once more, by facing (see [`facing`]).
+    pub by_facing: bool,
 }
 
 impl Structure for Octree {
     fn build(&self, scene: &Scene) -> Result<Hierarchy> {
         let root = self.root_cell(scene);
+        if self.by_facing && matches!(self.policy, Policy::Replicate | Policy::Split) {
+            return Err(Error::new("leaves=\"facing\" needs leaves of whole triangles, each in one of them")
+                .key("leaves")
+                .help("take policy \"L\" or \"E\""));
+        }
         match self.policy {
             Policy::Loose => Ok(self.build_loose(scene, &root)),
             Policy::Enclose => Ok(self.build_enclosing(scene, &root)),
@@ -198,13 +211,17 @@ impl Octree {
     }
 
     fn finish(&self, scene: &Scene, mut nodes: Vec<Node>, mut entries: Vec<u32>, boxes: &[Box32]) -> Hierarchy {
+        let limit = if self.by_facing { 0 } else { u64::from(self.leaf_limit) };
+        if self.by_facing {
+            facing::split_leaves(scene, &mut nodes, &mut entries);
+        }
         builder::visit_owners(&mut nodes, &mut entries, |own| {
             builder::sort_by_material(own, scene);
             own.iter().fold(Box32::EMPTY, |b, t| b.union(boxes[*t as usize]))
         });
         builder::pull_up_bounds(&mut nodes);
         let mut h = builder::flatten(scene, &nodes, entries, None);
-        h.stats = builder::stats(&nodes, u64::from(self.leaf_limit));
+        h.stats = builder::stats(&nodes, limit);
         h
     }
 }

@@ -58,6 +58,8 @@ fn the_published_triangle_counts_are_hit_exactly() {
         ("rooms:world=4", 30_199),
         ("blocks:world=5", 2_548),
         ("blocks:world=6", 10_040),
+        ("blocks:world=5,distribution=clustered", 2_548),
+        ("blocks:world=6,distribution=clustered", 10_040),
         ("arena:map=nucleus", 19_963),
         ("arena:map=coal_town", 25_894),
         ("arena:map=ravine", 33_422),
@@ -68,6 +70,35 @@ fn the_published_triangle_counts_are_hit_exactly() {
     ];
     for (spec, count) in published {
         assert_eq!(made(spec).len(), count, "{spec}");
+    }
+}
+
+/// Shares of a scene's triangles in the cells of an n x m plan.
+fn plan_shares(scene: &Scene, n: usize, m: usize) -> Vec<f64> {
+    let bounds = scene.bounds();
+    let mut shares = vec![0.0; n * m];
+    for t in 0..scene.len() as u32 {
+        let [a, b, c] = scene.corners(t);
+        let at = ((a + b + c) / 3.0 - bounds.lo) / bounds.size();
+        let cell = |x: f64, count: usize| ((x * count as f64) as usize).min(count - 1);
+        shares[cell(at.y, m) * n + cell(at.x, n)] += 1.0 / scene.len() as f64;
+    }
+    shares
+}
+
+#[test]
+fn clustered_objects_crowd_where_uniform_ones_are_everywhere() {
+    let largest = |shares: &[f64], count: usize| {
+        let mut sorted = shares.to_vec();
+        sorted.sort_by(|a, b| b.total_cmp(a));
+        sorted[..count].iter().sum::<f64>()
+    };
+    for (uniform, clustered, n, m, crowded) in [
+        ("blocks:triangles=60000", "blocks:triangles=60000,distribution=clustered", 3, 3, 2),
+        ("rooms:world=2", "rooms:world=3", 10, 4, 12),
+    ] {
+        let [even, uneven] = [uniform, clustered].map(|spec| largest(&plan_shares(&made(spec), n, m), crowded));
+        assert!(even < 0.5 && uneven > 0.65, "{uniform}: {even:.2}, {clustered}: {uneven:.2}");
     }
 }
 

@@ -87,6 +87,8 @@ const OCTREES: &[&str] = &[
     "octree:policy=E",
     "octree:policy=E,depth=10",
     "octree:policy=E,depth=7,leaf_limit=5,root=cube",
+    "octree:depth=3,leaves=facing",
+    "octree:policy=E,depth=2,leaves=facing",
 ];
 
 const REPLICATED: &[&str] =
@@ -100,12 +102,15 @@ const BSPS: &[&str] = &[
     "bsp:layout=binary",
     "bsp:min_leaf=60,layout=binary",
     "bsp:min_leaf=60",
+    "bsp:min_leaf=60,heuristic=surface",
     "bsp:min_leaf=80,split_weight=0,candidates=3",
     "bsp:min_leaf=80,split_weight=100,axis_penalty=0,sample=64,layout=binary",
 ];
 
+const HYBRIDS: &[&str] = &["hybrid:inner=bsp,leaf_size=200,dense=300,depth=1"];
+
 fn all() -> impl Iterator<Item = &'static str> {
-    [LISTS, OCTREES, REPLICATED, SPLIT, BSPS].into_iter().flatten().copied()
+    [LISTS, OCTREES, REPLICATED, SPLIT, BSPS, HYBRIDS].into_iter().flatten().copied()
 }
 
 /// Large triangles through each other: small leaves need more pieces than a BSP may make.
@@ -236,5 +241,9 @@ fn unknown_and_impossible_parameters_are_named() {
     assert!(error("octree:depth=11").contains("from 0 to 10"));
     assert!(error("octree:policy=Q").contains("\"L\", \"R\", \"S\", \"E\""));
     assert!(error("bsp:minleaf=3").contains("did you mean `min_leaf`?"));
+    let scene = soup(1, 10, 1.0, 1.0);
+    let (made, _) = structure::make(&Spec::parse("octree:policy=R,leaves=facing").unwrap()).unwrap();
+    let e = made.build(&scene).unwrap_err();
+    assert!(e.key.as_deref() == Some("leaves") && e.to_string().contains("policy \"L\""), "{e}");
     assert!(error("list:leaf_size=0").contains("from 1 to"));
 }

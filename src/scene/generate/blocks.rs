@@ -31,6 +31,11 @@ pub const ENTRY: Entry<dyn Generator> = Entry {
             about: "exact number of triangles, at least 2,400; 0 takes the world's",
         },
         Param {
+            name: "distribution",
+            default: Default::Later(&Default::Choice(&["uniform", "clustered"])),
+            about: "windows, roofs and street furniture all over town, or crowded into two blocks",
+        },
+        Param {
             name: "seed",
             default: Default::Int { value: 1, min: 0, max: i64::MAX },
             about: "shapes the buildings",
@@ -42,8 +47,12 @@ pub const ENTRY: Entry<dyn Generator> = Entry {
 struct Blocks {
     world: usize,
     triangles: usize,
+    clustered: bool,
     seed: u64,
 }
+
+/// Downtown and one block beside it: where things crowd.
+const CROWDED: [u32; 2] = [4, 5];
 
 impl Blocks {
     fn new(spec: &Spec) -> Blocks {
@@ -52,7 +61,8 @@ impl Blocks {
             0 => PUBLISHED[world - 5],
             n => n as usize,
         };
-        Blocks { world, triangles, seed: spec.int("seed") as u64 }
+        let clustered = spec.text("distribution") == "clustered";
+        Blocks { world, triangles, clustered, seed: spec.int("seed") as u64 }
     }
 }
 
@@ -88,9 +98,19 @@ impl Generator for Blocks {
         }
         rng.shuffle(&mut props);
         street(&mut props, &mut rng);
+        if self.clustered {
+            props.retain(|p| CROWDED.iter().any(|block| is_in_block(p.frame.apply(v3(0.0, 0.0, 0.0)), *block)));
+        }
         let line = [v3(PITCH - STREET, 40.0, 6.0), v3(PITCH, 40.0, 6.0)];
         spend(b, &props, self.triangles, line).finish()
     }
+}
+
+/// Whether `p` is in the block or in the half of the streets round it.
+fn is_in_block(p: crate::math::DVec3, block: u32) -> bool {
+    let (x, y) = (p.x - f64::from(block % 3) * PITCH, p.y - f64::from(block / 3) * PITCH);
+    let within = |at: f64| (-STREET * 0.5..=BLOCK + STREET * 0.5).contains(&at);
+    within(x) && within(y)
 }
 
 fn building(

@@ -3,7 +3,6 @@
 //! largest child until it is full. Leaves, their order and their boxes stay.
 
 use crate::hierarchy::{LANES, NONE};
-use crate::math::Box32;
 use crate::structure::builder::Node;
 
 /// Nodes of the wide tree, children side by side and after their parent.
@@ -29,7 +28,7 @@ pub fn collapse(binary: &[Node]) -> Vec<Node> {
 fn adopt(binary: &[Node], i: usize) -> Vec<usize> {
     let mut family: Vec<usize> = binary[i].children().collect();
     while !family.is_empty() && family.len() < LANES {
-        let area = |i: &usize| half_area(&binary[*i].bounds);
+        let area = |i: &usize| binary[*i].bounds.half_area();
         let inner = (0..family.len()).filter(|k| !binary[family[*k]].is_leaf());
         // The first of equals, so that the tree depends on the boxes alone.
         let Some(largest) = inner.rev().max_by(|a, b| area(&family[*a]).total_cmp(&area(&family[*b]))) else { break };
@@ -38,19 +37,13 @@ fn adopt(binary: &[Node], i: usize) -> Vec<usize> {
     family
 }
 
-/// A large box is the likeliest to be asked about without being decided.
-fn half_area(b: &Box32) -> f32 {
-    let s = b.hi - b.lo;
-    s.x * s.y + s.y * s.z + s.z * s.x
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_full_binary_tree_of_three_levels_becomes_one_group_of_eight() {
-        let unit = Box32 { lo: crate::math::Vec3::ZERO, hi: crate::math::Vec3::ONE };
+        let unit = crate::math::Box32 { lo: crate::math::Vec3::ZERO, hi: crate::math::Vec3::ONE };
         let mut binary: Vec<Node> = (0..15).map(|i| Node { bounds: unit, ..Node::new(i, i + 1, 0) }).collect();
         for (i, node) in binary.iter_mut().enumerate().take(7) {
             node.first_child = 2 * i as u32 + 1;

@@ -3,6 +3,8 @@
 
 pub mod collapse;
 pub mod cut;
+pub mod facing;
+pub mod graft;
 pub mod morton;
 pub mod piece;
 

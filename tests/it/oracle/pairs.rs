@@ -20,6 +20,7 @@ fn structures() -> Vec<String> {
             all.push(format!("octree:depth=3,policy={policy},root={root}"));
         }
     }
+    all.push("octree:depth=2,leaves=facing".into());
     all.extend(["wide", "binary"].map(|layout| format!("bsp:min_leaf=40,layout={layout}")));
     all
 }

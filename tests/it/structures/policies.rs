@@ -143,7 +143,7 @@ fn a_replicated_leaf_holds_exactly_the_triangles_that_overlap_its_cell() {
     ];
     for (scene, overlaps) in cases {
         let h = build("octree:policy=R,depth=3", &scene);
-        let octree = Octree { depth: 3, policy: Policy::Replicate, cube: false, leaf_limit: 0 };
+        let octree = Octree { depth: 3, policy: Policy::Replicate, cube: false, leaf_limit: 0, by_facing: false };
         let mut all = Vec::new();
         cells(octree.root_cell(&scene), 3, &mut all);
         let expected: Vec<Vec<u32>> = all
