@@ -3,7 +3,7 @@
 //! # Code map
 //! Two halves meet at plain types in [`record`]:
 //! - the **lab** (`math`, `scene`, `hierarchy`, `structure`, `culling`, `oracle`,
-//!   `runner`, `stats`, `viewing`) is synchronous: no tokio, no SQL, no HTTP, no clock
+//!   `runner`, `advice`, `stats`, `viewing`) is synchronous: no tokio, no SQL, no HTTP, no clock
 //!   inside an algorithm;
 //! - the **service** (`manifest`, `matrix`, `store`, `worker`, `report`, `cli`)
 //!   knows nothing of triangles; what it needs of them it asks of the lab in a
@@ -15,6 +15,7 @@
 //! counter-clockwise seen from the front. Depth grows away from the eye.
 //! Durations end in `_ns`, lengths in `_m`. Ranges are half-open, indices `u32`.
 
+pub mod advice;
 pub mod culling;
 pub mod error;
 pub mod hierarchy;

@@ -2,6 +2,10 @@
 //! child process), never the frame: frames of one walk are autocorrelated, so
 //! an interval over them would be far too narrow.
 
+mod nnls;
+
+pub use nnls::nnls;
+
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 

@@ -21,12 +21,14 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     match read(&args.manifest, &args.set) {
         Ok((manifest, matrix)) => {
+            tell_absent(&manifest);
             let (runs, excluded) = (matrix.runs.len(), matrix.excluded_runs.len());
             let (claims, sweeps) = (manifest.claims.len(), manifest.sweeps.len());
             if args.json {
                 let value = serde_json::json!({
                     "ok": true, "study": manifest.study.name, "runs": runs, "excluded": excluded,
                     "duplicates": matrix.duplicates, "claims": claims, "sweeps": sweeps, "scenes": manifest.scenes.len(),
+                    "absent": manifest.absent,
                 });
                 println!("{value:#}");
             } else {
@@ -47,6 +49,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             Ok(ExitCode::from(2))
         }
     }
+}
+
+/// Scenes that the study goes without, on standard error.
+pub fn tell_absent(manifest: &Manifest) {
+    manifest.absent.iter().for_each(|(name, why)| eprintln!("left out: scene {name}: {why}"));
 }
 
 /// Manifest and matrix, or every mistake in them.

@@ -6,14 +6,15 @@ mod text;
 
 use text::Report;
 
-use super::scene::{SceneOptions, path_file_spec, spec_of};
+use super::camera::CameraOptions;
+use super::scene::{SceneOptions, path_of, spec_of};
 use crate::culling::{self, DrawList, Tally};
 use crate::error::{Error, Result};
 use crate::manifest::axes;
-use crate::math::{Arithmetic, Camera, Projection};
+use crate::math::Arithmetic;
 use crate::oracle::image::Grid;
 use crate::oracle::{Effort, FrameTruth, losses, observed_class, verdict};
-use crate::record::{Accuracy, PathSource, PathSpec, SceneSpec};
+use crate::record::Accuracy;
 use crate::registry::{Spec, parse_sum};
 use crate::runner::{Setup, submitted};
 use crate::scene::{load, walkthrough};
@@ -47,20 +48,8 @@ pub struct Args {
     /// Numbers in which tests are evaluated that state none
     #[arg(long, value_name = "NAME", default_value_t, value_parser = Arithmetic::parse)]
     arithmetic: Arithmetic,
-    /// Full vertical field of view of a perspective camera, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 60.0)]
-    fov_y_deg: f64,
-    /// Full height of the view volume, metres; makes the camera orthographic
-    #[arg(long, value_name = "M")]
-    ortho_height_m: Option<f64>,
-    /// Width over height, as 16:9 or 1.778
-    #[arg(long, default_value = "16:9", value_parser = parse_aspect)]
-    aspect: f64,
-    #[arg(long, value_name = "M", default_value_t = 0.1)]
-    near_m: f64,
-    /// Infinite if absent
-    #[arg(long, value_name = "M")]
-    far_m: Option<f64>,
+    #[command(flatten)]
+    camera: CameraOptions,
     /// Pixels in which errors are counted
     #[arg(long, value_name = "PX", default_value_t = 1920, value_parser = clap::value_parser!(u32).range(1..=16384))]
     width: u32,
@@ -90,10 +79,10 @@ pub struct Args {
 /// Exit code 1 if the frame is wrong for the method's declared class.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     // What needs no scene is checked first: loading may take a while.
-    let camera = camera(&args)?;
+    let camera = args.camera.camera()?;
     let method = Method::parse(&args)?;
     let scene_spec = spec_of(&args.scene, &args.options)?;
-    let path_spec = path_spec(&args.path, &scene_spec)?;
+    let path_spec = path_of(&args.path, &scene_spec)?;
     let scene = load::load(&scene_spec)?;
     let mut poses = walkthrough::load(&path_spec, &scene_spec, &scene)?;
     let frame_count = poses.len();
@@ -114,7 +103,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         setup.cull(frame, &mut list, &mut tally);
     }
     let view = setup.views[args.frame as usize].clone();
-    let height_px = args.height.unwrap_or_else(|| (f64::from(args.width) / args.aspect).round().max(1.0) as u32);
+    let height_px = args.height.unwrap_or_else(|| (f64::from(args.width) / args.camera.aspect).round().max(1.0) as u32);
     let grid = Grid { width_px: args.width, height_px, samples: args.samples };
     let (witness_rays, hiding_cells) = (args.witness_rays, args.hiding_cells);
     let effort = Effort::new(&setup.scene, &Accuracy { witness_rays, hiding_cells, ..Accuracy::default() });
@@ -171,49 +160,6 @@ impl Method {
     }
 }
 
-fn camera(args: &Args) -> Result<Camera> {
-    let bad = |key: &str, value: f64, want: &str| Err(Error::new(format!("is {value}, but must be {want}")).key(key));
-    if !(0.01..180.0).contains(&args.fov_y_deg) {
-        return bad("--fov-y-deg", args.fov_y_deg, "from 0.01 to below 180 degrees");
-    }
-    if !(args.near_m.is_finite() && args.near_m > 0.0) {
-        return bad("--near-m", args.near_m, "above 0");
-    }
-    if let Some(far_m) = args.far_m.filter(|f| !(f.is_finite() && *f > args.near_m)) {
-        return bad(
-            "--far-m",
-            far_m,
-            &format!("beyond the near plane at {} m; leave it out for infinite", args.near_m),
-        );
-    }
-    let projection = match args.ortho_height_m {
-        None => Projection::Perspective { fov_y_rad: args.fov_y_deg.to_radians() },
-        Some(height_m) if height_m.is_finite() && height_m > 0.0 => Projection::Orthographic { height_m },
-        Some(height_m) => return bad("--ortho-height-m", height_m, "above 0"),
-    };
-    Ok(Camera { projection, aspect: args.aspect, near_m: args.near_m, far_m: args.far_m })
-}
-
-fn parse_aspect(text: &str) -> Result<f64, String> {
-    let number = |t: &str| t.trim().parse::<f64>().ok().filter(|x| x.is_finite() && *x > 0.0);
-    let aspect = match text.split_once([':', '/']) {
-        Some((w, h)) => number(w).zip(number(h)).map(|(w, h)| w / h),
-        None => number(text),
-    };
-    aspect.filter(|a| (0.01..=100.0).contains(a)).ok_or_else(|| "write 16:9 or a number from 0.01 to 100".to_string())
-}
-
-/// A file if it exists or looks like one; otherwise a walk.
-fn path_spec(text: &str, scene: &SceneSpec) -> anyhow::Result<PathSpec> {
-    let file = Path::new(text);
-    if file.exists() || text.contains('/') || text.ends_with(".csv") {
-        return path_file_spec(file, scene);
-    }
-    let source = PathSource::Generated(Spec::parse(text)?);
-    let fingerprint = walkthrough::fingerprint(&source, &scene.fingerprint)?;
-    Ok(PathSpec { name: text.to_string(), source, frames: None, stride: 1, fingerprint })
-}
-
 fn no_such_frame(args: &Args, count: usize) -> Error {
     let frames = if count == 1 { "1 frame".to_string() } else { format!("{count} frames") };
     Error::new(format!("is {}, but path {} has {frames}", args.frame, args.path))
@@ -225,19 +171,4 @@ fn write_ids(file: &Path, ids: &[u32]) -> Result<()> {
     let mut text = String::with_capacity(ids.len() * 7);
     ids.iter().for_each(|id| text.extend([&id.to_string(), "\n"]));
     std::fs::write(file, text).map_err(|e| Error::io(file, "cannot write the submitted ids", &e))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn aspects_are_ratios_or_numbers() {
-        assert_eq!(parse_aspect("16:9"), Ok(16.0 / 9.0));
-        assert_eq!(parse_aspect("4/3"), Ok(4.0 / 3.0));
-        assert_eq!(parse_aspect("1.5"), Ok(1.5));
-        for bad in ["", "16:", "0:9", "-1", "wide", "inf", "1:0", "1e9"] {
-            assert!(parse_aspect(bad).is_err(), "{bad}");
-        }
-    }
 }

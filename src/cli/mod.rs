@@ -1,6 +1,8 @@
 //! The command line: one file a verb.
 
+pub mod advise;
 pub mod backup;
+mod camera;
 pub mod cancel;
 pub mod check;
 pub mod claims;
@@ -81,6 +83,8 @@ pub enum Verb {
     Doctor(doctor::Args),
     /// Copy the database while others work with it
     Backup(backup::Args),
+    /// Which combination to use for a scene and a path, and why
+    Advise(advise::Args),
     /// One frame of one method: counters, errors, image, submitted ids
     Inspect(inspect::Args),
     /// Scenes: info, generate, convert
@@ -130,6 +134,7 @@ pub fn main() -> ExitCode {
         Verb::Token(v) => token::run(v),
         Verb::Doctor(a) => doctor::run(a),
         Verb::Backup(a) => backup::run(a),
+        Verb::Advise(a) => advise::run(a),
         Verb::Inspect(a) => inspect::run(a),
         Verb::Scene(v) => scene::run(v),
         Verb::Path(v) => path::run(v),

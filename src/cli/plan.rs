@@ -36,6 +36,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Ok(manifest) => manifest,
         Err(errors) => return Ok(mistakes(&errors, args.json)),
     };
+    check::tell_absent(&manifest);
     let plan = match store::block_on(planned(&args, &manifest))? {
         Ok(plan) => plan,
         Err(errors) => return Ok(mistakes(&errors, args.json)),

@@ -61,6 +61,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Ok(manifest) => manifest,
         Err(errors) => return Ok(mistakes(&errors, args.json)),
     };
+    check::tell_absent(&manifest);
     // Counted and left before any thread starts: threads inherit where they may run.
     let launcher = Launcher::here()?;
     let machine_class = machine::environment(None).machine_class;

@@ -157,6 +157,17 @@ pub fn path_file_spec(file: &Path, scene: &SceneSpec) -> anyhow::Result<PathSpec
     Ok(PathSpec { name, source, frames: None, stride: 1, fingerprint })
 }
 
+/// A file if it exists or looks like one; otherwise a walk.
+pub fn path_of(text: &str, scene: &SceneSpec) -> anyhow::Result<PathSpec> {
+    let file = Path::new(text);
+    if file.exists() || text.contains('/') || text.ends_with(".csv") {
+        return path_file_spec(file, scene);
+    }
+    let source = PathSource::Generated(Spec::parse(text)?);
+    let fingerprint = walkthrough::fingerprint(&source, &scene.fingerprint)?;
+    Ok(PathSpec { name: text.to_string(), source, frames: None, stride: 1, fingerprint })
+}
+
 fn save(scene: &Scene, out: &Path) -> anyhow::Result<ExitCode> {
     let notes = write::write(out, scene)?;
     let bytes = std::fs::metadata(out).with_context(|| out.display().to_string())?.len();

@@ -3,7 +3,7 @@
 use super::client::{Client, Server, escape};
 use super::watch;
 use crate::error::{Error, Result};
-use crate::manifest::Manifest;
+use crate::manifest::{Manifest, reach};
 use crate::record::{PathSource, SceneSource};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -107,12 +107,14 @@ fn with_uploads(client: &Client, path: &Path, sets: &[String]) -> anyhow::Result
     for (kind, file) in &files {
         let id = send(client, kind, file)?;
         let named = file.strip_prefix(folder).unwrap_or(file).display().to_string();
-        let (quoted, upload) = (format!("\"{named}\""), format!("\"upload:{id}\""));
-        if !text.contains(&quoted) {
+        let upload = format!("\"upload:{id}\"");
+        let quoted =
+            text.split('"').skip(1).step_by(2).find(|t| **t == named || reach::expanded(t).is_ok_and(|p| p == *file));
+        let Some(quoted) = quoted.map(|t| format!("\"{t}\"")) else {
             return Err(Error::new(format!("`{named}` was sent, but is not written so in the manifest"))
                 .help("write its path in double quotes, without escapes")
                 .into());
-        }
+        };
         text = text.replace(&quoted, &upload);
     }
     Ok(text)

@@ -380,6 +380,18 @@ pub fn make_walk(spec: &Spec) -> Result<(Box<dyn Walk>, Spec)> {
     Ok((entry.build(&resolved), resolved))
 }
 
+/// The walk over a structure that none is chosen for: what has no hierarchy (a list, a
+/// grid of cells) is judged block by block, portals are there to be looked through.
+pub fn usual_walk(structure: &Spec) -> Spec {
+    let is_flat = structure.kind == "list" || structure.params.get("layout") == Some(&Value::Text("flat".into()));
+    let spec = Spec::new(match structure.kind.as_str() {
+        _ if is_flat => "flat",
+        "portal_octree" => "portals",
+        _ => "depth_first",
+    });
+    find("walk", WALKS, &spec).map_or(spec, |(_, resolved)| resolved)
+}
+
 /// Class and entitlement of a sum of tests: the weakest class, the union of sets.
 pub fn promise(tests: &[Box<dyn Test>]) -> (Class, Removes) {
     tests.iter().fold((Class::Conservative, Removes::default()), |(class, removes), t| {

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result, did_you_mean};
 use crate::math::{Arithmetic, Camera, arithmetic};
 use crate::record::cameras::{self, CAMERAS};
-use crate::registry::{Entry, Param, Spec, Value, find};
+use crate::registry::{Entry, Param, Spec, find};
 use crate::{culling, structure};
 
 /// An axis other than `scene` and `path`, whose values are the manifest's own.
@@ -64,7 +64,7 @@ pub static AXES: &[Axis] = &[
         what: "walk",
         sum: false,
         default: &["auto"],
-        auto: Some(walk_for),
+        auto: Some(culling::usual_walk),
         settled: None,
         complete: None,
         parts: || parts(culling::WALKS),
@@ -93,18 +93,6 @@ pub static AXES: &[Axis] = &[
         check: cameras::check,
     },
 ];
-
-/// What has no hierarchy (a list, a grid of cells) is judged block by block; portals
-/// are there to be looked through.
-fn walk_for(structure: &Spec) -> Spec {
-    let is_flat = structure.kind == "list" || structure.params.get("layout") == Some(&Value::Text("flat".into()));
-    let spec = Spec::new(match structure.kind.as_str() {
-        _ if is_flat => "flat",
-        "portal_octree" => "portals",
-        _ => "depth_first",
-    });
-    find("walk", culling::WALKS, &spec).map_or(spec, |(_, s)| s)
-}
 
 fn arithmetics() -> Vec<Part> {
     let part = |a: Arithmetic| Part { name: a.name(), revision: a.revision(), params: &[] };

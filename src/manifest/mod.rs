@@ -46,6 +46,8 @@ pub struct Manifest {
     pub scenes: Vec<SceneSpec>,
     /// Walkthroughs of scene `i`, fingerprinted over that scene.
     pub paths: Vec<Vec<PathSpec>>,
+    /// Optional scenes that are not there: name and reason.
+    pub absent: Vec<(String, String)>,
     /// Values of every axis of `[matrix]`, in the order of [`axes::AXES`]; before
     /// them the scenes, by number.
     pub axes: Vec<AxisValues>,
@@ -144,7 +146,7 @@ fn decode(mistakes: &Mistakes, table: &tree::Table, path: &Path) -> Option<Manif
     let (repeat, timing) = sections::measure(&mut fields);
     let accuracy = sections::accuracy(&mut fields);
     let model = sections::model(&mut fields);
-    let scenes::Scenes { scenes, paths, names } = scenes::read(&mut fields);
+    let scenes::Scenes { scenes, paths, names, absent } = scenes::read(&mut fields);
     // A section with mistakes stops the manifest; its default lets the rest be checked.
     let section = camera.unwrap_or_default();
     let matrix = rules::matrix(&mut fields, &names, &section);
@@ -166,6 +168,7 @@ fn decode(mistakes: &Mistakes, table: &tree::Table, path: &Path) -> Option<Manif
         model,
         scenes,
         paths,
+        absent,
         axes: matrix.axes,
         scene_axis: matrix.scene_axis,
         zip: matrix.zip,

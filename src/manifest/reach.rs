@@ -53,12 +53,26 @@ impl Reach {
     pub fn resolve(&self, folder: &Path, text: &str) -> Result<PathBuf> {
         let upload = text.strip_prefix(UPLOAD);
         match (self, upload) {
-            (Reach::Anywhere, None) => Ok(folder.join(text)),
+            (Reach::Anywhere, None) => Ok(folder.join(expanded(text)?)),
             (Reach::Anywhere, Some(_)) => Err(Error::new("uploads are known to a server alone")
                 .help("send the manifest to it (`cullmark submit --server URL`), or name a file")),
             (Reach::Within(allowed), Some(name)) => allowed.upload(name),
             (Reach::Within(allowed), None) => allowed.file(folder, text),
         }
+    }
+}
+
+/// `$NAME/rest` with the variable's value. A server expands nothing: what is set there is
+/// none of its users' business.
+///
+/// # Errors
+/// When the variable is not set.
+pub fn expanded(text: &str) -> Result<PathBuf> {
+    let Some((name, rest)) = text.strip_prefix('$').and_then(|t| t.split_once('/')) else { return Ok(text.into()) };
+    match std::env::var_os(name).filter(|v| !v.is_empty()) {
+        Some(folder) => Ok(Path::new(&folder).join(rest)),
+        None => Err(Error::new(format!("the variable {name} is not set"))
+            .help(format!("set it to the folder that holds {rest}: export {name}=/some/folder"))),
     }
 }
 
@@ -127,5 +141,8 @@ mod tests {
             assert!(ask("out/secret.obj").is_err());
         }
         assert!(Reach::Anywhere.resolve(Path::new("/x"), "../y.obj").is_ok());
+        let e = Reach::Anywhere.resolve(Path::new("/x"), "$CULLMARK_NO_SUCH_VARIABLE/y.obj").unwrap_err();
+        assert!(e.message.contains("CULLMARK_NO_SUCH_VARIABLE is not set"), "{e}");
+        assert!(ask("$HOME/y.obj").is_err(), "a server expands nothing");
     }
 }

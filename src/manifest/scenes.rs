@@ -18,6 +18,8 @@ pub struct Scenes {
     /// Of every scene, in the order of the file.
     pub paths: Vec<Vec<PathSpec>>,
     pub names: Names,
+    /// Optional scenes whose files are not there: name and reason.
+    pub absent: Vec<(String, String)>,
 }
 
 /// Names that selections may use, also of scenes that have mistakes of their own.
@@ -40,6 +42,7 @@ impl Names {
 pub fn read(top: &mut Fields) -> Scenes {
     let mut names = Names::default();
     let mut scenes: Vec<(SceneSpec, Place)> = Vec::new();
+    let mut absent = Vec::new();
     let whole = top.place.clone();
     let tables = top.tables("scene");
     if tables.is_empty() && !top.has("scene") {
@@ -49,6 +52,11 @@ pub fn read(top: &mut Fields) -> Scenes {
     for mut f in tables {
         let name = f.name("name", "name the scene, such as name = \"hall\"");
         unique(&mut f, "scene", name.as_deref(), &names.scenes);
+        if let (Some(why), Some(name)) = (missing(&mut f), &name) {
+            absent.push((name.clone(), why));
+            names.scenes.push(name.clone());
+            continue;
+        }
         let place = f.place.clone();
         let members = scene(f, name.as_deref());
         // A scene with mistakes keeps its name, so that rules about it are not mistakes too.
@@ -59,8 +67,18 @@ pub fn read(top: &mut Fields) -> Scenes {
     for mut f in top.tables("path") {
         let name = f.name("name", "name the path, such as name = \"walk\"");
         unique(&mut f, "path", name.as_deref(), &names.paths);
+        if let (Some(_), Some(name)) = (missing(&mut f), &name) {
+            names.paths.push(name.clone());
+            continue;
+        }
         let members = path(f, name.as_deref(), &scenes, &names, &mut paths);
         names.paths.extend(if members.is_empty() { Vec::from_iter(name) } else { members });
+    }
+    if let ([], [(name, why), ..]) = (&scenes[..], &absent[..])
+        && top.mistakes.is_empty()
+    {
+        let e = Error::new(format!("no scene of the study is there: `{name}`, for one: {why}"));
+        top.note(&whole, "scene", e.help("put the files in their place, or set the variable that names their folder"));
     }
     for ((scene, place), paths) in scenes.iter().zip(&paths) {
         if paths.is_empty() && top.mistakes.is_empty() {
@@ -68,7 +86,7 @@ pub fn read(top: &mut Fields) -> Scenes {
             top.note(place, "path", e.help("add [[path]] with a file, or generate = \"walk:frames=2000\""));
         }
     }
-    Scenes { scenes: scenes.into_iter().map(|(s, _)| s).collect(), paths, names }
+    Scenes { scenes: scenes.into_iter().map(|(s, _)| s).collect(), paths, names, absent }
 }
 
 fn member_names(members: &[SceneSpec]) -> Vec<String> {
@@ -87,6 +105,14 @@ fn unique(f: &mut Fields, what: &str, name: Option<&str>, before: &[String]) {
         let e = Error::new(format!("`{name}` names two {what}s"));
         f.note(&node.place, "name", e.help(format!("rename one, such as \"{name}_2\"")));
     }
+}
+
+/// Why an entry with `optional = true` is left out: its file is not there.
+fn missing(f: &mut Fields) -> Option<String> {
+    let optional = f.bool("optional").unwrap_or(false);
+    let node = f.get("file").filter(|_| optional)?;
+    let path = f.mistakes.sources.resolve(&node.place, node.text()?);
+    path.and_then(|p| readable(&p)).err().map(|e| e.message)
 }
 
 /// Every scene that an entry means; none if it has mistakes.

@@ -146,7 +146,11 @@ pub fn expand(manifest: &Manifest, setting: &Setting) -> Result<Matrix, Vec<Erro
     }
     let excluded_runs: Vec<(RunSpec, usize)> =
         excluded.iter().map(|(c, rule)| (build(manifest, setting, &pool, c), *rule)).collect();
-    Ok(Matrix { runs, excluded: summary(manifest, &excluded_runs), excluded_runs, duplicates })
+    let mut left_out = summary(manifest, &excluded_runs);
+    // As many as one of the scenes that are there has, before anything is excluded.
+    let count = product.count(manifest) / manifest.scenes.len().max(1) as u64;
+    left_out.extend(manifest.absent.iter().map(|(cell, why)| Excluded { cell: cell.clone(), why: why.clone(), count }));
+    Ok(Matrix { runs, excluded: left_out, excluded_runs, duplicates })
 }
 
 fn empty(manifest: &Manifest, excluded: usize) -> Error {

@@ -100,6 +100,26 @@ impl Scene {
         Aabb::of_points(self.triangles.iter().flatten().map(|v| &self.positions[*v as usize]))
     }
 
+    /// The triangles `chosen` as a scene of their own, about the same origin.
+    pub fn part(&self, chosen: &[u32]) -> Scene {
+        let pick = |column: &[u32]| chosen.iter().map(|t| column[*t as usize]).collect();
+        let flag = |column: &[bool]| chosen.iter().map(|t| column[*t as usize]).collect();
+        Scene {
+            name: self.name.clone(),
+            origin: self.origin,
+            positions: chosen.iter().flat_map(|t| self.corners(*t)).collect(),
+            triangles: (0..chosen.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+            source_triangle_id: pick(&self.source_triangle_id),
+            object_id: pick(&self.object_id),
+            material_id: pick(&self.material_id),
+            two_sided: flag(&self.two_sided),
+            occluder: flag(&self.occluder),
+            material_names: self.material_names.clone(),
+            source_triangle_count: self.source_triangle_count,
+            ..Scene::default()
+        }
+    }
+
     /// Sets `origin` to the centre of the bounds, rounded to whole metres.
     pub fn anchor(&mut self) {
         let bounds = self.bounds();

@@ -8,7 +8,7 @@
 //! Conservative, as both parts are.
 
 use super::Structure;
-use super::builder::graft::{Scion, graft, part_of};
+use super::builder::graft::{Scion, graft};
 use super::octree::{Octree, Policy};
 use crate::error::Result;
 use crate::hierarchy::{Hierarchy, LANES, NONE};
@@ -71,7 +71,7 @@ impl Structure for Hybrid {
             .map(|leaf| {
                 let (links, lane) = (&stock.links[leaf as usize / LANES], leaf as usize % LANES);
                 let own = &stock.entries[links.first[lane] as usize..links.end[lane] as usize];
-                let mut tree = inner.build(&part_of(scene, own))?;
+                let mut tree = inner.build(&scene.part(own))?;
                 tree.entries.iter_mut().for_each(|t| *t = own[*t as usize]);
                 Ok(Scion { leaf, tree })
             })

@@ -57,6 +57,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("culling", with(&["scene", "hierarchy"])),
         ("oracle", with(&["scene", "culling"])),
         ("preview", with(&["scene"])),
+        ("advice", with(&["scene", "hierarchy", "structure", "culling", "stats"])),
         ("runner", with(&["scene", "hierarchy", "structure", "culling", "oracle", "machine", "stats"])),
         (
             "viewing",

@@ -13,26 +13,6 @@ pub struct Scion {
     pub tree: Hierarchy,
 }
 
-/// The triangles `chosen` of `scene` as a scene of their own, about the same origin.
-pub fn part_of(scene: &Scene, chosen: &[u32]) -> Scene {
-    let pick = |column: &[u32]| chosen.iter().map(|t| column[*t as usize]).collect();
-    let flag = |column: &[bool]| chosen.iter().map(|t| column[*t as usize]).collect();
-    Scene {
-        name: scene.name.clone(),
-        origin: scene.origin,
-        positions: chosen.iter().flat_map(|t| scene.corners(*t)).collect(),
-        triangles: (0..chosen.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
-        source_triangle_id: pick(&scene.source_triangle_id),
-        object_id: pick(&scene.object_id),
-        material_id: pick(&scene.material_id),
-        two_sided: flag(&scene.two_sided),
-        occluder: flag(&scene.occluder),
-        material_names: scene.material_names.clone(),
-        source_triangle_count: scene.source_triangle_count,
-        ..Scene::default()
-    }
-}
-
 /// `stock` with every scion in its leaf's place; `scions` in the order of the leaves'
 /// entries. Material runs are numbered anew; half-spaces are left out.
 pub fn graft(scene: &Scene, stock: &Hierarchy, scions: Vec<Scion>) -> Hierarchy {

@@ -1,0 +1,266 @@
+//! Which combination of structure, culling and walk to use for a scene and a path.
+//!
+//! Every candidate is first counted on a *sample* of the scene ([`sample`]): its work on
+//! the frames of a probe, times what each piece of work costs ([`cost`]), plus what it
+//! submits times what drawing costs. That needs no clock, so the same question gets the
+//! same short list everywhere. The short list is then built over the whole scene and
+//! timed on the probe, taking turns ([`probe`]); the fastest is the advice. Silva (2009)
+//! found another winner in every world and left the choice to the reader.
+//!
+//! The measure of an adviser is its regret: how much slower its choice is than the best
+//! of the full matrix (`cullmark advise --study`).
+
+pub mod candidates;
+pub mod cost;
+pub mod features;
+pub mod probe;
+pub mod sample;
+
+use crate::culling::{self, Class};
+use crate::error::{Error, Result};
+use crate::math::{Camera, Pose, View};
+use crate::record::TimeModel;
+use crate::registry::{Spec, format_sum};
+use crate::scene::Scene;
+use features::Features;
+use probe::{Built, Counts, Timing};
+use serde::Serialize;
+
+/// What is to be least.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Objective {
+    /// Culling, indices and draw calls: the frame as the model has it.
+    #[default]
+    Frame,
+    /// Culling alone.
+    Cull,
+}
+
+/// One cell of a matrix without its scene.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Combination {
+    pub structure: Spec,
+    pub culling: Vec<Spec>,
+    pub walk: Spec,
+}
+
+impl Combination {
+    /// `octree:depth=5 × frustum+back_face`, the walk only where it is not the usual one.
+    pub fn label(&self) -> String {
+        let part = |kind: &str, spec: &Spec| match kind {
+            "structure" => crate::structure::ALL.iter().find(|e| e.name == spec.kind).map(|e| spec.label(e.params)),
+            _ => culling::TESTS.iter().find(|e| e.name == spec.kind).map(|e| spec.label(e.params)),
+        };
+        let own = |kind, spec: &Spec| part(kind, spec).unwrap_or_else(|| spec.to_string());
+        let tests: Vec<String> = self.culling.iter().map(|s| own("culling", s)).collect();
+        let tests = if tests.is_empty() { format_sum(&[]) } else { tests.join("+") };
+        let walk = culling::WALKS.iter().find(|e| e.name == self.walk.kind).map(|e| self.walk.label(e.params));
+        let usual = matches!(self.walk.kind.as_str(), "flat" | "depth_first" | "portals") && self.walk_is_plain();
+        let walk = walk.filter(|_| !usual).map(|w| format!(" × {w}")).unwrap_or_default();
+        format!("{} × {tests}{walk}", own("structure", &self.structure))
+    }
+
+    fn walk_is_plain(&self) -> bool {
+        let entry = culling::WALKS.iter().find(|e| e.name == self.walk.kind);
+        entry.is_some_and(|e| self.walk.label(e.params) == self.walk.kind)
+    }
+}
+
+/// The question.
+pub struct Question<'a> {
+    pub scene: &'a Scene,
+    pub poses: &'a [Pose],
+    pub camera: Camera,
+    pub model: TimeModel,
+    pub objective: Objective,
+    pub candidates: Vec<Combination>,
+    /// Methods that may lose visible triangles are candidates too.
+    pub aggressive: bool,
+    /// How many are built over the whole scene and timed.
+    pub short_list: usize,
+    /// Frames of the probe, and how often the short list takes its turn.
+    pub probe_frames: usize,
+    pub turns: usize,
+}
+
+/// A candidate and what became of it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Considered {
+    pub combination: Combination,
+    pub label: String,
+    /// Why it was not counted, if it was not.
+    pub left_out: Option<String>,
+    pub class: Option<Class>,
+    /// On the sample, scaled to the scene; a frame's mean.
+    pub predicted: Option<Counts>,
+    pub predicted_ns: Option<f64>,
+    /// On the whole scene, for those of the short list.
+    pub timed: Option<Timing>,
+}
+
+/// The answer; `considered` from the best predicted to the worst, then those left out.
+#[derive(Debug, Clone, Serialize)]
+pub struct Advice {
+    pub objective: Objective,
+    pub features: Features,
+    /// Triangles of the sample, and of how many it takes one.
+    pub sample_triangles: usize,
+    pub one_in: u32,
+    pub probe: Vec<u32>,
+    pub considered: Vec<Considered>,
+    /// Index in `considered`.
+    pub chosen: usize,
+    /// Sentences.
+    pub why: Vec<String>,
+}
+
+/// Answers the question. Reads the clock: who calls sees to a quiet, pinned core.
+///
+/// # Errors
+/// When the scene or the path is empty, or no candidate is left.
+pub fn advise(question: &Question) -> Result<Advice> {
+    if question.scene.is_empty() || question.poses.is_empty() {
+        let what = if question.scene.is_empty() { "scene has no triangles" } else { "path has no frames" };
+        return Err(Error::new(format!("there is nothing to advise on: the {what}")));
+    }
+    let probe = probe::frames(question.poses.len(), question.probe_frames);
+    let views: Vec<View> = probe.iter().map(|f| View::new(&question.camera, &question.poses[*f as usize])).collect();
+    let features = Features::of(question.scene, &views);
+    let sample = sample::Sample::of(question.scene);
+    let mut considered: Vec<Considered> = question.candidates.iter().map(blank).collect();
+    predict(question, &features, &sample, &views, &mut considered);
+    considered.sort_by(|a, b| {
+        let key = |c: &Considered| c.predicted_ns.unwrap_or(f64::INFINITY);
+        key(a).total_cmp(&key(b))
+    });
+    let short = short_list(&considered, question.short_list);
+    if short.is_empty() {
+        let why = considered.iter().find_map(|c| c.left_out.clone()).unwrap_or_default();
+        return Err(Error::new("no candidate is left to advise on").help(why));
+    }
+    let mut built = Vec::new();
+    for i in short {
+        match Built::new(question.scene, &considered[i].combination) {
+            Ok(b) => built.push((i, b)),
+            Err(e) => considered[i].left_out = Some(e.to_string()),
+        }
+    }
+    probe::time(&mut built, &views, question, &mut considered);
+    let best = |c: &&(usize, Built)| considered[c.0].timed.as_ref().map_or(f64::INFINITY, |t| t.objective_ns);
+    let chosen = built.iter().min_by(|a, b| best(a).total_cmp(&best(b))).map(|b| b.0);
+    let Some(chosen) = chosen.filter(|i| considered[*i].timed.is_some()) else {
+        return Err(Error::new("no structure of the short list could be built"));
+    };
+    let why = reasons(question, &considered, chosen);
+    Ok(Advice {
+        objective: question.objective,
+        features,
+        sample_triangles: sample.scene.len(),
+        one_in: sample.one_in,
+        probe,
+        considered,
+        chosen,
+        why,
+    })
+}
+
+fn blank(combination: &Combination) -> Considered {
+    Considered {
+        combination: combination.clone(),
+        label: combination.label(),
+        left_out: None,
+        class: None,
+        predicted: None,
+        predicted_ns: None,
+        timed: None,
+    }
+}
+
+/// Counts every candidate on the sample, each structure built once.
+fn predict(
+    question: &Question,
+    features: &Features,
+    sample: &sample::Sample,
+    views: &[View],
+    considered: &mut [Considered],
+) {
+    let mut order: Vec<usize> = (0..considered.len()).collect();
+    order.sort_by_key(|i| considered[*i].combination.structure.to_string());
+    let mut last: Option<(Spec, Result<Built>)> = None;
+    for i in order {
+        let c = &mut considered[i];
+        if let Some(why) = candidates::pointless(&c.combination, features) {
+            c.left_out = Some(why);
+            continue;
+        }
+        // What looks through walls needs all of them.
+        let (scene, one_in) = match c.combination.structure.kind.as_str() {
+            "portal_octree" => (question.scene, 1),
+            _ => (&sample.scene, sample.one_in),
+        };
+        let scaled = sample::scaled(&c.combination.structure, one_in);
+        let same = last.as_ref().is_some_and(|(spec, _)| *spec == scaled);
+        if !same {
+            let whole = Combination { structure: scaled.clone(), ..c.combination.clone() };
+            last = Some((scaled, Built::new(scene, &whole)));
+        }
+        let outcome = match last.as_mut() {
+            Some((_, Ok(built))) => built.count(scene, &c.combination, views),
+            Some((_, Err(e))) => Err(Error::new(e.to_string())),
+            None => continue,
+        };
+        match outcome {
+            Err(e) => c.left_out = Some(e.to_string()),
+            Ok((class, _)) if class > Class::Conservative && !question.aggressive => {
+                c.class = Some(class);
+                c.left_out = Some("may lose visible triangles".into());
+            }
+            Ok((class, counts)) => {
+                let counts = counts.scaled(f64::from(one_in));
+                let cull = cost::cull_ns(&counts);
+                let draw = counts.draw_ns(&question.model);
+                c.class = Some(class);
+                c.predicted_ns = Some(if question.objective == Objective::Cull { cull } else { cull + draw });
+                c.predicted = Some(counts);
+            }
+        }
+    }
+}
+
+/// The first `count` of different structure; then, if there are not so many, any.
+fn short_list(considered: &[Considered], count: usize) -> Vec<usize> {
+    let ranked: Vec<usize> = (0..considered.len()).filter(|i| considered[*i].predicted_ns.is_some()).collect();
+    ranked.into_iter().take(count.max(1)).collect()
+}
+
+/// What speaks for the choice, in figures of the timed probe.
+fn reasons(question: &Question, considered: &[Considered], chosen: usize) -> Vec<String> {
+    let us = |ns: f64| format!("{:.1} us", ns / 1e3);
+    let Some(own) = &considered[chosen].timed else { return Vec::new() };
+    let mut out = vec![format!(
+        "it culls a frame in {}, and submits {:.0} triangles of {} in {:.0} draw calls: {} as modelled",
+        us(own.cull_ns),
+        own.counts.entries,
+        question.scene.len(),
+        own.counts.draw_calls,
+        us(own.cull_ns + own.draw_ns),
+    )];
+    let rivals =
+        considered.iter().enumerate().filter(|(i, _)| *i != chosen).filter_map(|(_, c)| Some((c, c.timed.as_ref()?)));
+    for (rival, t) in rivals {
+        let ratio = t.objective_ns / own.objective_ns;
+        let what = |mine: f64, theirs: f64| theirs - mine;
+        let (cull, draw) = (what(own.cull_ns, t.cull_ns), what(own.draw_ns, t.draw_ns));
+        let cause = if cull.abs() > draw.abs() { "culling" } else { "drawing" };
+        let tie = t.low_ns <= own.high_ns && own.low_ns <= t.high_ns;
+        let close = if tie { ", within the noise of the probe" } else { "" };
+        out.push(format!(
+            "{} takes {ratio:.2} times as long{close}, mostly for {cause} ({} against {})",
+            rival.label,
+            us(if cause == "culling" { t.cull_ns } else { t.draw_ns }),
+            us(if cause == "culling" { own.cull_ns } else { own.draw_ns }),
+        ));
+    }
+    out
+}

@@ -1,0 +1,209 @@
+//! The frames of the probe, counting work on them and timing it.
+
+use super::{Combination, Considered, Objective, Question};
+use crate::culling::{self, Class, DrawList, Tally, Test, Walk, cull};
+use crate::error::{Error, Result};
+use crate::hierarchy::Hierarchy;
+use crate::math::View;
+use crate::record::TimeModel;
+use crate::scene::Scene;
+use crate::stats;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// Frames in a row: methods may remember the frame before.
+const BURST: usize = 8;
+
+/// About `count` frames of `0..frames` in bursts of neighbours, evenly spread.
+pub fn frames(frames: usize, count: usize) -> Vec<u32> {
+    if frames <= count {
+        return (0..frames as u32).collect();
+    }
+    let bursts = count.div_ceil(BURST).max(1);
+    let start = |i: usize| if bursts == 1 { 0 } else { i * (frames - BURST.min(frames)) / (bursts - 1) };
+    let mut all: Vec<u32> = (0..bursts).flat_map(|i| (start(i)..start(i) + BURST).map(|f| f as u32)).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// Mean work of a frame, by the names of counters, and what is submitted.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Counts {
+    pub work: BTreeMap<&'static str, f64>,
+    pub entries: f64,
+    pub draw_calls: f64,
+}
+
+impl Counts {
+    pub fn of(&self, name: &str) -> f64 {
+        match name {
+            "frames" => 1.0,
+            _ => self.work.get(name).copied().unwrap_or(0.0),
+        }
+    }
+
+    /// Of a sample to the whole: what goes with triangles grows, nodes stay.
+    pub fn scaled(mut self, one_in: f64) -> Counts {
+        self.entries *= one_in;
+        for name in ["triangle_tests", "predicates"] {
+            if let Some(x) = self.work.get_mut(name) {
+                *x *= one_in;
+            }
+        }
+        self
+    }
+
+    pub fn draw_ns(&self, model: &TimeModel) -> f64 {
+        model.index_ns * 3.0 * self.entries + model.draw_call_ns * self.draw_calls
+    }
+}
+
+/// What timing the probe gave, a frame's mean.
+#[derive(Debug, Clone, Serialize)]
+pub struct Timing {
+    /// Median over turns, with its 95 % interval in `low_ns` and `high_ns` of the objective.
+    pub cull_ns: f64,
+    pub draw_ns: f64,
+    pub objective_ns: f64,
+    pub low_ns: f64,
+    pub high_ns: f64,
+    pub counts: Counts,
+    pub build_ns: f64,
+    /// Structure and columns of tests.
+    pub bytes: usize,
+}
+
+/// A structure over a scene, with the tests and the walk of one combination.
+pub struct Built {
+    hierarchy: Hierarchy,
+    tests: Vec<Box<dyn Test>>,
+    walk: Box<dyn Walk>,
+    build_ns: f64,
+    test_bytes: usize,
+    list: DrawList,
+}
+
+impl Built {
+    /// # Errors
+    /// When the structure does not suit the scene, or the walk the structure.
+    pub fn new(scene: &Scene, combination: &Combination) -> Result<Built> {
+        let start = Instant::now();
+        let hierarchy = crate::structure::make(&combination.structure)?.0.build(scene)?;
+        let mut built = Built {
+            hierarchy,
+            tests: Vec::new(),
+            walk: culling::make_walk(&combination.walk)?.0,
+            build_ns: 0.0,
+            test_bytes: 0,
+            list: DrawList::default(),
+        };
+        built.take(scene, combination)?;
+        built.build_ns = start.elapsed().as_nanos() as f64;
+        Ok(built)
+    }
+
+    /// Other tests and another walk over the same structure.
+    fn take(&mut self, scene: &Scene, combination: &Combination) -> Result<()> {
+        self.tests = culling::make_tests(&combination.culling)?.0;
+        self.walk = culling::make_walk(&combination.walk)?.0;
+        if let Some(why) = self.walk.refuses(&self.hierarchy) {
+            return Err(Error::new(format!("the walk cannot run over this structure: {why}")));
+        }
+        self.test_bytes = self.tests.iter_mut().map(|t| t.prepare(scene, &self.hierarchy)).sum();
+        Ok(())
+    }
+
+    /// Class and mean counts of `combination`, whose structure this is, over `views`.
+    pub fn count(&mut self, scene: &Scene, combination: &Combination, views: &[View]) -> Result<(Class, Counts)> {
+        self.take(scene, combination)?;
+        let (class, _) = culling::promise(&self.tests);
+        Ok((class, self.pass(views)))
+    }
+
+    /// One pass over `views` from a fresh start.
+    pub fn pass(&mut self, views: &[View]) -> Counts {
+        self.reset();
+        let (mut tally, mut counts) = (Tally::default(), Counts::default());
+        let (mut entries, mut calls, mut ranges) = (0, 0, 0);
+        for view in views {
+            self.cull(view, &mut tally);
+            entries += self.list.entry_count();
+            calls += self.list.draw_calls(&self.hierarchy);
+            ranges += self.list.ranges.len() as u64;
+        }
+        let mean = |sum: u64| sum as f64 / views.len() as f64;
+        counts.work = tally.named().iter().map(|(name, _, sum)| (*name, mean(*sum))).collect();
+        counts.work.insert("ranges", mean(ranges));
+        (counts.entries, counts.draw_calls) = (mean(entries), mean(calls));
+        counts
+    }
+
+    fn reset(&mut self) {
+        self.tests.iter_mut().for_each(|t| t.reset());
+        self.walk.reset();
+    }
+
+    fn cull(&mut self, view: &View, tally: &mut Tally) {
+        cull(view, &self.hierarchy, &mut self.tests, self.walk.as_mut(), &mut self.list, tally);
+    }
+
+    /// Mean nanoseconds of a frame in one pass.
+    pub fn time(&mut self, views: &[View]) -> f64 {
+        self.reset();
+        let mut tally = Tally::default();
+        let start = Instant::now();
+        for view in views {
+            self.cull(view, &mut tally);
+        }
+        start.elapsed().as_nanos() as f64 / views.len() as f64
+    }
+}
+
+/// Times all of `built` (each with its index in `considered`), taking turns.
+pub fn time(built: &mut [(usize, Built)], views: &[View], question: &Question, considered: &mut [Considered]) {
+    let counts: Vec<Counts> = built.iter_mut().map(|(_, b)| b.pass(views)).collect();
+    let mut turns: Vec<Vec<f64>> = vec![Vec::new(); built.len()];
+    for turn in 0..question.turns.max(1) + 1 {
+        for ((_, b), turns) in built.iter_mut().zip(&mut turns) {
+            let ns = b.time(views);
+            // The first turn warms the caches.
+            if turn > 0 {
+                turns.push(ns);
+            }
+        }
+    }
+    for (((i, b), turns), counts) in built.iter().zip(turns).zip(counts) {
+        let draw_ns = counts.draw_ns(&question.model);
+        let drawn = if question.objective == Objective::Frame { draw_ns } else { 0.0 };
+        let (low, high) = stats::median_ci(&turns);
+        let cull_ns = stats::median(&turns);
+        considered[*i].timed = Some(Timing {
+            cull_ns,
+            draw_ns,
+            objective_ns: cull_ns + drawn,
+            low_ns: low + drawn,
+            high_ns: high + drawn,
+            counts,
+            build_ns: b.build_ns,
+            bytes: b.hierarchy.bytes() + b.test_bytes,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_probe_is_bursts_from_the_first_frame_to_the_last() {
+        assert_eq!(frames(5, 64), [0, 1, 2, 3, 4]);
+        let probe = frames(2000, 64);
+        assert_eq!((probe.len(), probe[0], probe[63]), (64, 0, 1999));
+        assert_eq!(probe[8] - probe[7], 1992 / 7 - 7);
+        let dense = frames(70, 64);
+        assert!(dense.windows(2).all(|w| w[0] < w[1]) && *dense.last().unwrap() == 69, "{dense:?}");
+        assert_eq!(frames(1, 1), [0]);
+    }
+}

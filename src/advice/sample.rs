@@ -1,0 +1,61 @@
+//! A sample of a scene on which candidates are counted: every k-th triangle, with
+//! whatever a structure counts in triangles scaled by k.
+//!
+//! A leaf of 64 triangles of the scene is a leaf of 64 / k of the sample, in about the
+//! same place, so nodes and ranges come out alike and triangles k times fewer. Files keep
+//! neighbours together, so every k-th triangle is spread over the scene.
+
+use crate::registry::{Spec, Value};
+use crate::scene::Scene;
+
+/// Scenes of up to so many triangles are their own sample.
+const TRIANGLES_MAX: usize = 1 << 14;
+
+pub struct Sample {
+    pub scene: Scene,
+    /// Of how many triangles it takes one.
+    pub one_in: u32,
+}
+
+impl Sample {
+    pub fn of(scene: &Scene) -> Sample {
+        let one_in = scene.len().div_ceil(TRIANGLES_MAX).max(1);
+        let chosen: Vec<u32> = (0..scene.len() as u32).step_by(one_in).collect();
+        Sample { scene: scene.part(&chosen), one_in: one_in as u32 }
+    }
+}
+
+/// `structure` for a sample of one triangle in `one_in`.
+pub fn scaled(structure: &Spec, one_in: u32) -> Spec {
+    let mut out = structure.clone();
+    for (name, value) in &mut out.params {
+        let new = match (name.as_str(), &*value) {
+            // 0 means "no limit" where it is allowed at all.
+            ("leaf_size" | "min_leaf" | "leaf_limit" | "dense", Value::Int(n)) if *n > 0 => {
+                Value::Int((n / i64::from(one_in)).max(1))
+            }
+            // Cells go with the number of triangles, in a nested grid with its power 0.6.
+            ("density", Value::Float(x)) => {
+                let power = if structure.kind == "nested_grid" { 0.6 } else { 1.0 };
+                Value::Float((x * libm::pow(f64::from(one_in), power)).min(1000.0))
+            }
+            _ => continue,
+        };
+        *value = new;
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_counted_in_triangles_is_scaled() {
+        let spec = |text: &str| Spec::parse(text).unwrap();
+        assert_eq!(scaled(&spec("bvh:leaf_size=64,bins=16"), 10), spec("bvh:leaf_size=6,bins=16"));
+        assert_eq!(scaled(&spec("bsp:min_leaf=200"), 1000), spec("bsp:min_leaf=1"));
+        assert_eq!(scaled(&spec("octree:depth=4,leaf_limit=0"), 10), spec("octree:depth=4,leaf_limit=0"));
+        assert_eq!(scaled(&spec("uniform_grid:density=4.0"), 10), spec("uniform_grid:density=40.0"));
+    }
+}
