@@ -23,6 +23,24 @@ pub struct StudyResults {
     /// Charts of an error against a stressor that the manifest asks for.
     #[serde(default)]
     pub sweeps: Vec<Sweep>,
+    /// What an adviser chose, place by place.
+    #[serde(default)]
+    pub advice: Vec<Advised>,
+}
+
+/// The choice of an adviser who timed a few frames, to be held against the whole study.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Advised {
+    pub scene: String,
+    pub path: String,
+    /// Name of the metric that was to be least.
+    pub metric: String,
+    /// Of the chosen run.
+    pub measurement_id: String,
+    /// All that was chosen among, the short list that was timed first.
+    pub candidates: Vec<String>,
+    pub short_list: u32,
+    pub probe_frames: u32,
 }
 
 /// One of several measurements of the same study (`run --series next`).

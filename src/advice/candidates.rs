@@ -38,12 +38,12 @@ pub const CULLINGS: &[&str] =
 ///
 /// # Errors
 /// Never for the lists above; a caller's own may hold names that are unknown.
-pub fn product(structures: &[&str], cullings: &[&str]) -> Result<Vec<Combination>> {
+pub fn product<T: AsRef<str>>(structures: &[T], cullings: &[T]) -> Result<Vec<Combination>> {
     let mut out = Vec::new();
     for structure in structures {
-        let structure = structure::make(&Spec::parse(structure)?)?.1;
+        let structure = structure::make(&Spec::parse(structure.as_ref())?)?.1;
         for culling in cullings {
-            let culling = culling::make_tests(&parse_sum(culling)?)?.1;
+            let culling = culling::make_tests(&parse_sum(culling.as_ref())?)?.1;
             out.push(Combination { walk: usual_walk(&structure), structure: structure.clone(), culling });
         }
     }

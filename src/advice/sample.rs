@@ -9,7 +9,7 @@ use crate::registry::{Spec, Value};
 use crate::scene::Scene;
 
 /// Scenes of up to so many triangles are their own sample.
-const TRIANGLES_MAX: usize = 1 << 14;
+const TRIANGLES_MAX: usize = 1 << 15;
 
 pub struct Sample {
     pub scene: Scene,

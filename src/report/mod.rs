@@ -32,6 +32,7 @@ mod pairs;
 pub mod pareto;
 pub mod query;
 pub mod raster;
+mod regret;
 pub mod render;
 pub mod repeatability;
 pub mod repeatability_tables;
@@ -97,6 +98,7 @@ pub fn write_with_series(
         tables::build(&grid),
         tables::scenes(results),
         frontier_table::report(&grid),
+        regret::table(&grid),
         tables::errors(&grid),
         tables::problems(&grid),
         tables::excluded(results),

@@ -12,8 +12,8 @@ use sqlx::{FromRow, Sqlite, Transaction};
 use std::path::Path;
 
 const MAGIC: &[u8; 15] = b"CULLMARK STUDY\n";
-/// Raised when a row type below changes. Version 1 had no sweeps.
-const VERSION: u32 = 2;
+/// Raised when a row type below changes. Version 1 had no sweeps, version 2 no advice.
+const VERSION: u32 = 3;
 const LEVEL: i32 = 9;
 const HEADER: usize = MAGIC.len() + 4 + blake3::OUT_LEN;
 
@@ -89,8 +89,10 @@ struct Archive {
     counters: Vec<Counter>,
     judgements: Vec<Judged>,
     environments: Vec<Machine>,
-    /// At the end, so that what was written before there were sweeps is a prefix.
+    /// At the end, each later than the one before, so that what was written before they
+    /// were is a prefix.
     sweeps_json: String,
+    advice_json: String,
 }
 
 /// What an import brought.
@@ -126,6 +128,11 @@ impl Store {
                     .map_err(explain)?
             }};
         }
+        let (sweeps_json, advice_json) = sqlx::query_as("SELECT sweeps_json, advice_json FROM studies WHERE id = $1")
+            .bind(id)
+            .fetch_one(&mut *tx)
+            .await
+            .map_err(explain)?;
         let archive = Archive {
             study: rows!(Study, "id = $1", "id").remove(0),
             runs: rows!(Run, "study_id = $1", "ordinal"),
@@ -149,11 +156,8 @@ impl Store {
                 format!("environment_id IN (SELECT environment_id FROM trials WHERE {OF_STUDY})"),
                 "environment_id"
             ),
-            sweeps_json: sqlx::query_scalar("SELECT sweeps_json FROM studies WHERE id = $1")
-                .bind(id)
-                .fetch_one(&mut *tx)
-                .await
-                .map_err(explain)?,
+            sweeps_json,
+            advice_json,
         };
         let plain = postcard::to_stdvec(&archive).map_err(|e| Error::new(format!("packing the study: {e}")))?;
         let payload = zstd::bulk::compress(&plain, LEVEL).map_err(|e| Error::new(format!("packing the study: {e}")))?;
@@ -217,7 +221,7 @@ fn unpack(bytes: &[u8]) -> Result<Archive> {
         return Err(damaged());
     }
     let mut plain = zstd::stream::decode_all(payload).map_err(|_| damaged())?;
-    if version == 1 {
+    for _ in version..VERSION {
         plain.extend(postcard::to_stdvec("[]").expect("a string is plain data"));
     }
     postcard::from_bytes(&plain).map_err(|_| damaged())
@@ -236,6 +240,7 @@ async fn put(tx: &mut Transaction<'_, Sqlite>, archive: Archive, label: String) 
         judgements,
         environments,
         sweeps_json,
+        advice_json,
     } = archive;
     let added = study.insert(tx).await?;
     let study_id: i64 = sqlx::query_scalar("SELECT id FROM studies WHERE name = $1 AND series = $2")
@@ -245,9 +250,10 @@ async fn put(tx: &mut Transaction<'_, Sqlite>, archive: Archive, label: String) 
         .await?;
     if added > 0 {
         // It came as results; whoever wants the rest of it measured submits it.
-        sqlx::query("UPDATE studies SET sweeps_json = $1, state = 'paused' WHERE id = $2")
+        sqlx::query("UPDATE studies SET sweeps_json = $1, advice_json = $3, state = 'paused' WHERE id = $2")
             .bind(sweeps_json)
             .bind(study_id)
+            .bind(advice_json)
             .execute(&mut **tx)
             .await?;
     }

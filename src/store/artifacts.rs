@@ -19,9 +19,9 @@ impl Store {
     /// # Errors
     /// When there is no such study or the database fails.
     pub async fn report_key(&self, study_id: i64, folder: &Path) -> Result<String> {
-        type Series = (i64, i64, String, String, String, String, String, i64, Option<i64>);
+        type Series = (i64, i64, String, String, String, String, String, String, i64, Option<i64>);
         let series: Vec<Series> = sqlx::query_as(
-            "SELECT s.id, s.series, s.title, s.manifest_toml, s.claims_json, s.sweeps_json, s.runs_hash, \
+            "SELECT s.id, s.series, s.title, s.manifest_toml, s.claims_json, s.sweeps_json, s.advice_json, s.runs_hash, \
              s.consolidate_frames, (SELECT max(m.changed) FROM study_runs r JOIN measurements m \
              ON m.measurement_id = r.measurement_id WHERE r.study_id = s.id) FROM studies s \
              WHERE s.name = (SELECT name FROM studies WHERE id = $1) ORDER BY s.series",

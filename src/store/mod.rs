@@ -14,6 +14,7 @@
 //! - `archive`, `compact`, `backup`: one-file exchange, size, a copy of all of it.
 
 mod accept;
+pub mod advice;
 pub mod archive;
 pub mod artifacts;
 pub mod backup;

@@ -28,6 +28,7 @@ pub(super) struct StudyRow {
     manifest_toml: String,
     claims_json: String,
     sweeps_json: String,
+    advice_json: String,
     pub policy_json: String,
     consolidate_frames: i64,
     pub machine_class: String,
@@ -89,6 +90,7 @@ impl Store {
                 .map_err(explain)?;
         Ok(StudyResults {
             sweeps: self.parse(&study.sweeps_json, "the sweeps")?,
+            advice: self.parse(&study.advice_json, "the advice")?,
             name: study.name,
             title: study.title,
             manifest_toml: study.manifest_toml,
@@ -170,8 +172,8 @@ impl Store {
             _ => (study, None),
         };
         let row: Option<StudyRow> = sqlx::query_as(
-            "SELECT id, name, title, manifest_toml, claims_json, sweeps_json, policy_json, consolidate_frames, machine_class, \
-             created_ms FROM studies WHERE (name = $1 AND $2 IS NULL) OR (name = $3 AND series = $2) \
+            "SELECT id, name, title, manifest_toml, claims_json, sweeps_json, advice_json, policy_json, consolidate_frames, \
+             machine_class, created_ms FROM studies WHERE (name = $1 AND $2 IS NULL) OR (name = $3 AND series = $2) \
              ORDER BY series DESC LIMIT 1",
         )
         .bind(study)

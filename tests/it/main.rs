@@ -3,6 +3,8 @@
 
 mod common;
 
+mod advice;
+
 mod culling;
 #[cfg(feature = "service")]
 mod end_to_end;

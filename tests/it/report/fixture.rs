@@ -243,6 +243,7 @@ pub fn sized(scenes: &[(&str, f64)], frames: usize, trials: u32) -> StudyResults
     }
     StudyResults {
         sweeps: Vec::new(),
+        advice: Vec::new(),
         name: "serpa-2014".into(),
         title: "Octree and BSP under frustum and normal-mask culling".into(),
         manifest_toml:

@@ -7,8 +7,12 @@ use cullmark::store::{Kind, Pool, Store};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use std::path::{Path, PathBuf};
 
-/// Migrations as they were after the first, and after the second.
-const RELEASED: [&[&str]; 2] = [&["0001_first.sql"], &["0001_first.sql", "0002_sweeps.sql"]];
+/// Migrations as they were after the first, the second and the third.
+const RELEASED: [&[&str]; 3] = [
+    &["0001_first.sql"],
+    &["0001_first.sql", "0002_sweeps.sql"],
+    &["0001_first.sql", "0002_sweeps.sql", "0003_service.sql"],
+];
 
 fn migrations() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("migrations")
