@@ -32,7 +32,7 @@ mod pairs;
 pub mod pareto;
 pub mod query;
 pub mod raster;
-mod regret;
+pub mod regret;
 pub mod render;
 pub mod repeatability;
 pub mod repeatability_tables;

@@ -8,6 +8,7 @@ mod mistakes_axes;
 mod mistakes_matrix;
 mod mistakes_rules;
 mod mistakes_sections;
+mod optional;
 mod shapes;
 mod sweeps;
 
@@ -55,6 +56,9 @@ generate = "rooms:world=2"
 name = "w"
 file = "w.csv"
 "#;
+
+/// Two structures, one culling.
+pub const MATRIX_LINES: &str = "[matrix]\nstructure = [\"list\", \"octree\"]\nculling = [\"frustum\"]\n";
 
 /// The matrix of `HEAD` and `rest`; mistakes fail the test.
 pub fn matrix(rest: &str) -> Matrix {

@@ -10,6 +10,8 @@ mod fixture;
 mod frontier;
 #[path = "report/own_values.rs"]
 mod own_values;
+#[path = "report/regret.rs"]
+mod regret;
 #[path = "report/repeatability.rs"]
 mod repeatability;
 #[path = "report/sweeps.rs"]
