@@ -224,3 +224,56 @@ impl Cells {
         layers.into_iter().map(|(_, rows)| Branch::Inner(rows.into_iter().map(row).collect())).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+        #[test]
+        fn halving_finds_the_cells_that_one_by_one_tests_find(
+            p in prop::array::uniform3(prop::array::uniform3(-3.0..12.0f64)), counts in prop::array::uniform3(1u32..12), round in any::<bool>(), flat in any::<bool>(),
+        ) {
+            // Corners outside of the grid, too: members of a crowded cell reach out of it.
+            let corners = p.map(|v| DVec3::from(v.map(|x| if round { x.round() } else { x })));
+            let bounds = Aabb { lo: DVec3::ZERO, hi: DVec3::new(9.0, 9.0, if flat { 0.0 } else { 9.0 }) };
+            let grid = Grid::uniform(&bounds, counts);
+            let [x, y, z] = grid.counts();
+            let all = (0..x * y * z).map(|i| grid.at(i));
+            let naive: Vec<[u32; 3]> = all.filter(|at| cut::triangle_overlaps(&corners, &grid.cell(*at))).collect();
+            let (first, last) = grid.span(&Aabb::of_points(&corners));
+            let mut found = Vec::new();
+            if Aabb::of_points(&corners).overlaps(&bounds) {
+                overlapped_cells(&grid, &corners, first, last, &mut |at| found.push(at));
+            }
+            found.sort_by_key(|at| grid.number(*at));
+            prop_assert_eq!(found, naive);
+        }
+    }
+
+    #[test]
+    fn too_many_copies_are_an_error_that_names_the_parameter() {
+        let corners = vec![DVec3::ZERO, DVec3::new(9.0, 1.0, 2.0), DVec3::new(1.0, 9.0, 3.0)];
+        let scene =
+            Scene { positions: corners, triangles: vec![[0, 1, 2]; 50], material_id: vec![0; 50], ..Scene::default() };
+        let deal = |limit: u64, counts: u32| {
+            let budget = Budget::new(limit);
+            let dealer = Dealer {
+                scene: &scene,
+                policy: Policy::Replicate,
+                budget: &budget,
+                leaf_limit: 0,
+                levels: 0,
+                cells: &|_, _| 0.0,
+            };
+            let cells = dealer.deal(Grid::uniform(&scene.bounds(), [counts; 3]), &mut Vec::new());
+            cells.ok_or_else(|| budget.error("a grid", &scene, "density", "lower `density`"))
+        };
+        let e = deal(3000, 40).err().expect("50 large triangles in 64000 cells");
+        assert_eq!(e.key.as_deref(), Some("density"));
+        assert!(e.message.contains("3000") && e.help.unwrap().contains("lower `density`"));
+        assert!(deal(3000, 2).is_ok());
+    }
+}

@@ -12,8 +12,8 @@ use rayon::prelude::*;
 
 /// Bins an axis of a large node.
 const BINS: usize = 64;
-/// A median that makes more than 7/4 of the triangles there were parts too little.
-const GROWTH: (usize, usize) = (7, 4);
+/// A median that makes more than 3/2 of the triangles there were parts too little.
+const GROWTH: (usize, usize) = (3, 2);
 
 /// A triangle and its box, cut to the node's cell.
 #[derive(Debug, Clone, Copy)]

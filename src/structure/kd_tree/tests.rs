@@ -1,8 +1,12 @@
 //! Sweeps against their naive twins, and leaves against the cells they answer for.
 
 use super::cost::{Cost, share};
-use super::{loose, median, spatial};
+use super::{KdTree, Tree, loose, median, spatial};
 use crate::math::{Aabb, Box32, DVec3};
+use crate::scene::Scene;
+use crate::structure::builder::cut::{intersection, triangle_overlaps};
+use crate::structure::builder::leaves::{Branch, Leaf};
+use crate::structure::builder::straddle::{Budget, Policy};
 use proptest::prelude::*;
 
 const COST: Cost = Cost { traversal: 15.0, triangle: 20.0, empty_bonus: 0.2 };
@@ -99,4 +103,69 @@ fn shares_of_flat_and_of_empty_boxes() {
     assert_eq!(share(v(1.0, 2.0, 0.0), v(2.0, 2.0, 0.0)), 0.5, "by area");
     assert_eq!(share(v(0.5, 0.0, 0.0), v(2.0, 0.0, 0.0)), 0.25, "by length");
     assert_eq!(share(DVec3::ZERO, DVec3::ZERO), 1.0);
+}
+
+fn leaves(tree: &Tree) -> Vec<&Leaf<Vec<u32>>> {
+    match tree {
+        Branch::Leaf(leaf) => vec![leaf],
+        Branch::Inner(children) => children.iter().flat_map(leaves).collect(),
+    }
+}
+
+/// Small triangles with whole coordinates in 0..=8, many of them across an axis.
+fn blocks(seed: u32, count: u32) -> Scene {
+    let mut state = seed;
+    let mut digit = move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state >> 16) % 9.0
+    };
+    let mut scene = Scene::default();
+    for t in 0..count {
+        let (axis, corner) = (t as usize % 4, DVec3::new(digit(), digit(), digit()));
+        for _ in 0..3 {
+            let mut p = (corner + DVec3::new(digit(), digit(), digit()) * 0.25).floor().min(DVec3::splat(8.0));
+            if axis < 3 {
+                p[axis] = corner[axis];
+            }
+            scene.positions.push(p);
+        }
+        scene.triangles.push([3 * t, 3 * t + 1, 3 * t + 2]);
+        scene.material_id.push(0);
+    }
+    scene
+}
+
+// A0.3: in every leaf, what reaches into the cell; in some leaf, what lies in a plane.
+#[test]
+fn a_leaf_has_every_triangle_that_reaches_into_its_cell_and_none_that_is_apart() {
+    for (seed, count) in [(1, 40), (2, 300), (3, 2500)] {
+        let scene = blocks(seed, count);
+        for cost in [Some(COST), None] {
+            let params = KdTree { cost, leaf_size: 6, policy: Policy::Replicate, wide: false };
+            let tree = spatial::grow(&params, &scene, &Budget::of(&scene)).unwrap();
+            let (leaves, bounds) = (leaves(&tree), scene.bounds());
+            let volume = |b: &Aabb| b.size().element_product();
+            let sum: f64 = leaves.iter().map(|l| volume(&l.cell)).sum();
+            assert!((sum - volume(&bounds)).abs() < 1e-6 * sum, "cells fill the scene's box");
+            assert!(leaves.len() > 8, "{} leaves", leaves.len());
+            let mut held = vec![false; scene.len()];
+            for leaf in leaves {
+                for t in 0..count {
+                    let corners = scene.corners(t);
+                    let has = leaf.triangles.contains(&t);
+                    held[t as usize] |= has;
+                    // Away from the faces by a hair, whatever the test's rounding.
+                    let inner = Aabb { lo: leaf.cell.lo + 1e-9, hi: leaf.cell.hi - 1e-9 };
+                    assert!(
+                        has || inner.is_empty() || !triangle_overlaps(&corners, &inner),
+                        "{t} reaches into {:?}",
+                        leaf.cell
+                    );
+                    assert!(!has || triangle_overlaps(&corners, &leaf.cell), "{t} is apart from {:?}", leaf.cell);
+                    assert!(!has || !intersection(&scene.triangle_aabb(t), &leaf.cell).is_empty());
+                }
+            }
+            assert!(held.iter().all(|h| *h));
+        }
+    }
 }

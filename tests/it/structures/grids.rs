@@ -132,7 +132,7 @@ fn a_flat_grid_asks_about_every_cell_even_when_all_is_culled() {
     let scene = soup(35, 6000, 10.0, 0.3);
     let away = (DVec3::X * 40.0, DVec3::X);
     let mut cells = Vec::new();
-    for density in ["0.5", "4", "32"] {
+    for density in ["0.02", "0.2", "2"] {
         let flat = build(&format!("uniform_grid:density={density}"), &scene);
         let (visited, submitted) = frame(&flat, &scene, "flat", away.0, away.1);
         assert_eq!((visited, submitted), (flat.stats.leaves, 0), "density {density}");
@@ -246,15 +246,12 @@ fn crowded_cells_hold_grids_and_the_rest_is_counted() {
         let h = build(text, &scene);
         let over = leaf_sets(&h).iter().filter(|l| l.len() > limit(text)).count() as u64;
         assert_eq!(h.stats.oversized_leaves, over, "{text}");
-        let levels = if text.contains("levels=3") {
-            3
-        } else if text.contains("levels=2") {
-            2
-        } else {
-            1
-        };
+        let levels = ["levels=2", "levels=3"].iter().position(|l| text.contains(l)).map_or(1, |i| i as u64 + 2);
         let outer = if text.contains("flat") { 0 } else { 2 };
-        assert!((outer + 1..=outer + levels).contains(&h.stats.depth), "{text}: {:?}", h.stats);
+        // 4 N^0.6 cells of 13 triangles: none is crowded.
+        let nests = *text != "nested_grid";
+        assert_eq!(h.stats.depth > outer, nests, "{text}: {:?}", h.stats);
+        assert!(h.stats.depth <= outer + levels, "{text}: {:?}", h.stats);
     }
     let [coarse, nested] =
         [8, 1 << 20].map(|limit| build(&format!("nested_grid:density=0.2,leaf_limit={limit}"), &scene));
