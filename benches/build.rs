@@ -25,6 +25,16 @@ const STRUCTURES: &[&str] = &[
     "bsp",
     "bsp:layout=binary",
     "bsp:sample=1000000000",
+    "uniform_grid",
+    "uniform_grid:layout=rows",
+    "uniform_grid:policy=R",
+    "uniform_grid:policy=S",
+    "irregular_grid",
+    "irregular_grid:planes=walls",
+    "nested_grid",
+    "kd_tree",
+    "kd_tree:split=median",
+    "kd_tree:policy=R",
 ];
 
 fn main() {

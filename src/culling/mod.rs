@@ -383,9 +383,10 @@ pub fn make_walk(spec: &Spec) -> Result<(Box<dyn Walk>, Spec)> {
 /// The walk over a structure that none is chosen for: what has no hierarchy (a list, a
 /// grid of cells) is judged block by block, portals are there to be looked through.
 pub fn usual_walk(structure: &Spec) -> Spec {
-    let is_flat = structure.kind == "list" || structure.params.get("layout") == Some(&Value::Text("flat".into()));
+    let in_rows = structure.params.get("layout") == Some(&Value::Text("rows".into()));
     let spec = Spec::new(match structure.kind.as_str() {
-        _ if is_flat => "flat",
+        "list" => "flat",
+        "uniform_grid" | "irregular_grid" if !in_rows => "flat",
         "portal_octree" => "portals",
         _ => "depth_first",
     });

@@ -4,8 +4,12 @@
 pub mod bsp;
 pub mod builder;
 pub mod hybrid;
+pub mod irregular_grid;
+pub mod kd_tree;
 pub mod list;
+pub mod nested_grid;
 pub mod octree;
+pub mod uniform_grid;
 
 use crate::error::Result;
 use crate::hierarchy::Hierarchy;
@@ -21,7 +25,16 @@ pub trait Structure: Send + Sync {
 }
 
 /// Sorted by name.
-pub static ALL: &[Entry<dyn Structure>] = &[bsp::ENTRY, hybrid::ENTRY, list::ENTRY, octree::ENTRY];
+pub static ALL: &[Entry<dyn Structure>] = &[
+    bsp::ENTRY,
+    hybrid::ENTRY,
+    irregular_grid::ENTRY,
+    kd_tree::ENTRY,
+    list::ENTRY,
+    nested_grid::ENTRY,
+    octree::ENTRY,
+    uniform_grid::ENTRY,
+];
 
 /// The structure that `spec` names, with the spec's defaults filled in.
 pub fn make(spec: &Spec) -> Result<(Box<dyn Structure>, Spec)> {

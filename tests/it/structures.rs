@@ -1,6 +1,8 @@
 //! Structures: every triangle kept, bounds that hold, counts in the paper's terms.
 
 mod bsp;
+mod grids;
+mod kd_tree;
 mod policies;
 
 use crate::common::soup;
@@ -91,11 +93,48 @@ const OCTREES: &[&str] = &[
     "octree:policy=E,depth=2,leaves=facing",
 ];
 
-const REPLICATED: &[&str] =
-    &["octree:policy=R", "octree:policy=R,depth=2,root=cube", "octree:policy=R,depth=5,leaf_limit=40"];
+/// Every triangle once, too.
+const LOOSE: &[&str] = &[
+    "uniform_grid",
+    "uniform_grid:layout=rows",
+    "uniform_grid:density=60,layout=rows",
+    "irregular_grid",
+    "irregular_grid:planes=walls,nx=40,ny=3,nz=1,layout=rows",
+    "nested_grid",
+    "nested_grid:layout=flat,leaf_limit=5",
+    "nested_grid:density=1,leaf_limit=8,levels=3",
+    "kd_tree",
+    "kd_tree:layout=binary,leaf_size=8",
+    "kd_tree:split=median,leaf_size=20",
+];
 
-const SPLIT: &[&str] =
-    &["octree:policy=S", "octree:policy=S,depth=3,root=cube", "octree:policy=S,depth=5,leaf_limit=40"];
+const REPLICATED: &[&str] = &[
+    "octree:policy=R",
+    "octree:policy=R,depth=2,root=cube",
+    "octree:policy=R,depth=5,leaf_limit=40",
+    "uniform_grid:policy=R",
+    "uniform_grid:policy=R,density=0.5,layout=rows",
+    "irregular_grid:policy=R",
+    "irregular_grid:policy=R,planes=walls,layout=rows",
+    "nested_grid:policy=R,density=0.5",
+    "nested_grid:policy=R,density=0.25,layout=flat,levels=2,leaf_limit=20",
+    "kd_tree:policy=R",
+    "kd_tree:policy=R,split=median,layout=binary",
+];
+
+const SPLIT: &[&str] = &[
+    "octree:policy=S",
+    "octree:policy=S,depth=3,root=cube",
+    "octree:policy=S,depth=5,leaf_limit=40",
+    "uniform_grid:policy=S",
+    "uniform_grid:policy=S,density=0.5,layout=rows",
+    "irregular_grid:policy=S",
+    "irregular_grid:policy=S,planes=walls,layout=rows",
+    "nested_grid:policy=S,density=0.5",
+    "nested_grid:policy=S,density=0.25,layout=flat,levels=2,leaf_limit=20",
+    "kd_tree:policy=S",
+    "kd_tree:policy=S,split=median,layout=binary",
+];
 
 const BSPS: &[&str] = &[
     "bsp",
@@ -110,7 +149,7 @@ const BSPS: &[&str] = &[
 const HYBRIDS: &[&str] = &["hybrid:inner=bsp,leaf_size=200,dense=300,depth=1"];
 
 fn all() -> impl Iterator<Item = &'static str> {
-    [LISTS, OCTREES, REPLICATED, SPLIT, BSPS, HYBRIDS].into_iter().flatten().copied()
+    [LISTS, OCTREES, LOOSE, REPLICATED, SPLIT, BSPS, HYBRIDS].into_iter().flatten().copied()
 }
 
 /// Large triangles through each other: small leaves need more pieces than a BSP may make.
@@ -176,7 +215,8 @@ fn the_number_of_threads_changes_nothing() {
     let large = soup(3, 150_000, 100.0, 1.0);
     let small = soup(4, 12_000, 40.0, 1.0);
     for text in all() {
-        let scene = if LISTS.contains(&text) || OCTREES.contains(&text) { &large } else { &small };
+        let fast = [LISTS, OCTREES, LOOSE].iter().any(|all| all.contains(&text));
+        let scene = if fast { &large } else { &small };
         let (s, _) = structure::make(&Spec::parse(text).unwrap()).unwrap();
         let [a, b] = [1, 2].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

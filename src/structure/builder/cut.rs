@@ -34,7 +34,8 @@ pub fn build_replicated(scene: &Scene, root: &Aabb, depth: u32, leaf_limit: u32)
 /// pieces that splitting level by level does, whose diagonals are split again.
 pub fn build_split(scene: &Scene, root: &Aabb, depth: u32, leaf_limit: u32) -> Result<Hierarchy> {
     let tree = Tree::grow(scene, root, depth, leaf_limit, entries_max(scene), &|t, cell, out: &mut Vec<Piece>| {
-        out.extend(clip(scene, t, cell, root));
+        let inner = |axis: &usize| cell.hi[*axis] < root.hi[*axis];
+        out.extend(clip(scene, t, cell, (0..3).filter(inner).fold(0, |faces, axis| faces | 1 << axis)));
     })?;
     let boxes = tree.boxes(|p, _| p.bounds(scene));
     let entries: Vec<u32> = tree.items().map(|p| p.triangle).collect();
@@ -43,7 +44,7 @@ pub fn build_split(scene: &Scene, root: &Aabb, depth: u32, leaf_limit: u32) -> R
     Ok(tree.finish(scene, leaf_limit, &boxes, entries, fragments))
 }
 
-fn entries_max(scene: &Scene) -> u64 {
+pub(super) fn entries_max(scene: &Scene) -> u64 {
     ENTRIES_MAX.max(4 * scene.len() as u64)
 }
 
@@ -63,11 +64,12 @@ fn divide(scene: &Scene, triangles: &[u32], cell: &Aabb) -> [Vec<u32>; 8] {
 }
 
 /// The part of a triangle in a cell (Sutherland & Hodgman 1974), as a fan of
-/// pieces. A triangle in a face between two cells belongs to the upper one.
-fn clip(scene: &Scene, triangle: u32, cell: &Aabb, root: &Aabb) -> Vec<Piece> {
+/// pieces. What lies in an upper face that bit `axis` of `not_ours` names is the
+/// upper neighbour's.
+pub(super) fn clip(scene: &Scene, triangle: u32, cell: &Aabb, not_ours: u8) -> Vec<Piece> {
     let whole = Piece::whole(scene, triangle);
     let in_plane = |axis: usize, at: f64| whole.corners.iter().all(|p| p[axis] == at);
-    if (0..3).any(|axis| cell.hi[axis] < root.hi[axis] && in_plane(axis, cell.hi[axis])) {
+    if (0..3).any(|axis| not_ours >> axis & 1 == 1 && in_plane(axis, cell.hi[axis])) {
         return Vec::new();
     }
     let mut polygon: Vec<(DVec3, bool)> = whole.corners.iter().map(|p| (*p, false)).collect();
@@ -112,7 +114,7 @@ pub fn octants(cell: &Aabb) -> [Aabb; 8] {
     })
 }
 
-fn intersection(a: &Aabb, b: &Aabb) -> Aabb {
+pub fn intersection(a: &Aabb, b: &Aabb) -> Aabb {
     Aabb { lo: a.lo.max(b.lo), hi: a.hi.min(b.hi) }
 }
 

@@ -1,12 +1,16 @@
 //! What the builders share: a tree of nodes in one array, and its flattening
 //! into the 8-wide blocks of [`Hierarchy`].
 
+pub mod axes;
+pub mod cells;
 pub mod collapse;
 pub mod cut;
 pub mod facing;
 pub mod graft;
+pub mod leaves;
 pub mod morton;
 pub mod piece;
+pub mod straddle;
 
 use crate::hierarchy::{BoundsBlock, BuildStats, HalfSpace, Hierarchy, LANES, LinkBlock, NONE};
 use crate::math::{Aabb, Box32, DVec3};

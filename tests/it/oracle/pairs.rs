@@ -22,6 +22,17 @@ fn structures() -> Vec<String> {
     }
     all.push("octree:depth=2,leaves=facing".into());
     all.extend(["wide", "binary"].map(|layout| format!("bsp:min_leaf=40,layout={layout}")));
+    let cells = [
+        "uniform_grid:density=0.5",
+        "uniform_grid:density=0.5,policy=R,layout=rows",
+        "irregular_grid:nx=6,ny=6,nz=3,policy=S",
+        "irregular_grid:nx=6,ny=6,nz=3,planes=walls,layout=rows",
+        "nested_grid:density=0.5,leaf_limit=20",
+        "nested_grid:density=0.25,leaf_limit=20,policy=R,layout=flat",
+        "kd_tree:leaf_size=24",
+        "kd_tree:leaf_size=24,policy=S,layout=binary",
+    ];
+    all.extend(cells.map(String::from));
     all
 }
 

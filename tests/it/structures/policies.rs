@@ -1,23 +1,23 @@
-//! The octree and its policies for straddling triangles: facts A0.1 to A0.5, A4.1.
+//! Policies for straddling triangles, facts A0.1 to A0.5, and the octree, A4.1.
 
-use super::{OCTREES, REPLICATED, SPLIT, build, leaves, nodes, scene_of, scenes};
+use super::{LOOSE, OCTREES, REPLICATED, SPLIT, build, leaves, nodes, scene_of, scenes};
 use crate::common::soup;
 use cullmark::hierarchy::Hierarchy;
 use cullmark::math::{Aabb, DVec3};
 use cullmark::scene::Scene;
 use cullmark::structure::octree::{Octree, Policy};
 
-fn sorted(mut v: Vec<u32>) -> Vec<u32> {
+pub fn sorted(mut v: Vec<u32>) -> Vec<u32> {
     v.sort_unstable();
     v
 }
 
-fn area(t: &[DVec3; 3]) -> f64 {
+pub fn area(t: &[DVec3; 3]) -> f64 {
     (t[1] - t[0]).cross(t[2] - t[0]).length() * 0.5
 }
 
 /// Seeded numbers in 0..1.
-fn random(seed: u64) -> impl FnMut() -> f64 {
+pub fn random(seed: u64) -> impl FnMut() -> f64 {
     use rand_chacha::rand_core::{RngCore, SeedableRng};
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     move || (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
@@ -25,9 +25,9 @@ fn random(seed: u64) -> impl FnMut() -> f64 {
 
 // A0.1
 #[test]
-fn loose_and_enclosing_octrees_hold_every_triangle_once() {
+fn loose_and_enclosing_structures_hold_every_triangle_once() {
     for scene in scenes() {
-        for text in OCTREES {
+        for text in OCTREES.iter().chain(LOOSE) {
             let h = build(text, &scene);
             assert_eq!(sorted(h.entries), (0..scene.len() as u32).collect::<Vec<_>>(), "{text} on {}", scene.name);
         }
@@ -64,7 +64,7 @@ fn splitting_keeps_the_area_of_every_triangle() {
 }
 
 /// What a closed box leaves of a triangle, by clipping at its faces.
-fn touches(corners: &[DVec3; 3], cell: &Aabb) -> bool {
+pub fn touches(corners: &[DVec3; 3], cell: &Aabb) -> bool {
     let mut polygon = corners.to_vec();
     for (axis, sign, at) in (0..3).flat_map(|a| [(a, 1.0, cell.lo[a]), (a, -1.0, cell.hi[a])]) {
         let depth = |p: DVec3| (p[axis] - at) * sign;
@@ -102,7 +102,7 @@ fn cells(cell: Aabb, depth: u32, out: &mut Vec<Aabb>) {
 
 /// The separating-axis test in whole numbers: coordinates twice as large, so that
 /// cells of size 1 have whole centres.
-fn touches_exactly(corners: &[DVec3; 3], cell: &Aabb) -> bool {
+pub fn touches_exactly(corners: &[DVec3; 3], cell: &Aabb) -> bool {
     let whole = |v: DVec3| (v * 2.0).round().to_array().map(|x| x as i64);
     let (centre, half) = (whole(cell.centre()), whole(cell.size() * 0.5));
     let v = corners.map(|p| [0, 1, 2].map(|i| whole(p)[i] - centre[i]));
@@ -226,7 +226,7 @@ fn under_every_policy_the_leaves_reach_every_point_of_every_triangle() {
     let mut unit = random(15);
     for scene in scenes() {
         let size = scene.positions.iter().fold(1.0, |m: f64, p| m.max(p.abs().max_element()));
-        for text in OCTREES.iter().chain(REPLICATED).chain(SPLIT) {
+        for text in OCTREES.iter().chain(LOOSE).chain(REPLICATED).chain(SPLIT) {
             let h = build(text, &scene);
             let mut held = vec![Vec::new(); scene.len()];
             for (block, lane, _) in nodes(&h) {
