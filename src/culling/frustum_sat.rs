@@ -111,11 +111,12 @@ impl SeparatingAxes {
         let (centre, half) = ((lo + hi) * 0.5, (hi - lo) * 0.5);
         let extent = (lo.abs() + hi.abs()).element_sum();
         let deepest = self.forward.dot(centre) + self.forward.abs().dot(half) + GUARD * extent;
-        let far_m = self.far_m.min(deepest);
-        // In front of the near plane, which decides about such a box; or NaN.
-        if far_m.is_nan() || far_m < self.near_m {
-            return false;
+        // Wholly in front of the near plane.
+        if deepest < self.near_m {
+            tally.axis_tests += 1;
+            return true;
         }
+        let far_m = self.far_m.min(deepest);
         let magnitude = GUARD * (extent + self.base + (self.near_m + far_m) * self.slope);
         for axis in &self.axes {
             tally.axis_tests += 1;
