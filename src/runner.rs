@@ -267,7 +267,9 @@ fn record(
     let mut counters: Vec<Counter> = series[1..5].iter().map(sum).collect();
     for (i, (name, unit, _)) in Tally::default().named().iter().enumerate() {
         let value = work.iter().map(|w| w.tally.named()[i].2 as f64).sum();
-        counters.push(Counter { name: name.to_string(), unit: unit.to_string(), value });
+        if i < Tally::ALWAYS || value > 0.0 {
+            counters.push(Counter { name: name.to_string(), unit: unit.to_string(), value });
+        }
     }
     let load = &setup.scene.report;
     for (name, value) in [

@@ -150,7 +150,11 @@ impl RunView {
         }
         let next = self.shown.map_or(0, |s| s + 1);
         let from = match (self.setup.walk.remembers(), next <= n) {
-            (false, _) => n,
+            (false, _) => {
+                // A list that is reused would leave no answers to show.
+                self.setup.walk.reset();
+                n
+            }
             (true, true) => next,
             (true, false) => {
                 self.setup.reset();

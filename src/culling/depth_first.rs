@@ -4,8 +4,13 @@
 //!
 //! Nodes are visited in ascending order of their entries, so that neighbours in
 //! the draw list merge as far as they can.
+//!
+//! Three switches spare work where judging costs more than drawing (measured in
+//! docs/PERFORMANCE.md): `small` submits small subtrees whole, which may only add
+//! triangles; `whole_below` and `still` are in [`super::skipping`].
 
 use super::descent::Descent;
+use super::skipping::{STILL, Skipping, WHOLE_BELOW};
 use super::*;
 use crate::hierarchy::NONE;
 
@@ -13,13 +18,26 @@ pub const ENTRY: Entry<dyn Walk> = Entry {
     name: "depth_first",
     about: "down the hierarchy: skip what is outside, submit whole what is inside",
     revision: 1,
-    params: &[],
-    make: |_| Box::new(DepthFirst::default()),
+    params: &[
+        Param {
+            name: "small",
+            default: Allowed::Later(&Allowed::Int { value: 0, min: 0, max: u32::MAX as i64 }),
+            about: "subtrees of at most so many entries are submitted whole rather than entered; 0 enters all",
+        },
+        STILL,
+        WHOLE_BELOW,
+    ],
+    make: |spec| {
+        let small = spec.int("small") as u32;
+        Box::new(DepthFirst { small, skipping: Skipping::new(spec), ..DepthFirst::default() })
+    },
 };
 
 #[derive(Default)]
 pub struct DepthFirst {
     descent: Descent,
+    small: u32,
+    skipping: Skipping,
 }
 
 impl Walk for DepthFirst {
@@ -27,8 +45,20 @@ impl Walk for DepthFirst {
         None
     }
 
+    fn reset(&mut self) {
+        self.skipping.reset();
+    }
+
     fn remembers(&self) -> bool {
         false
+    }
+
+    fn without_judging(&mut self, view: &View, h: &Hierarchy, out: &mut DrawList, tally: &mut Tally) -> bool {
+        self.skipping.skips(view, h, out, tally)
+    }
+
+    fn done(&mut self, view: &View, out: &mut DrawList) {
+        self.skipping.keep(view, out);
     }
 
     fn run(
@@ -54,6 +84,11 @@ impl Walk for DepthFirst {
                 let (first, own_end, end) = (links.first[at.lane], links.own_end[at.lane], links.end[at.lane]);
                 let child = links.child[at.lane];
                 if child == NONE || self.descent.is_settled(at, count) {
+                    out.push(first, end);
+                    continue;
+                }
+                if end - first <= self.small {
+                    tally.subtrees_not_entered += 1;
                     out.push(first, end);
                     continue;
                 }

@@ -1,8 +1,10 @@
 //! `flat`: no hierarchy. Every leaf (and every node with entries of its own) is
 //! judged by itself, as if the structure were a list of its leaves. A structure
-//! that is a list is judged by the tests' wide kernels.
+//! that is a list is judged by the tests' wide kernels. Frames that need no judging at
+//! all are [`super::skipping`]'s.
 
 use super::descent::Descent;
+use super::skipping::{STILL, Skipping, WHOLE_BELOW};
 use super::*;
 use crate::hierarchy::{LinkBlock, NONE};
 
@@ -10,14 +12,15 @@ pub const ENTRY: Entry<dyn Walk> = Entry {
     name: "flat",
     about: "every leaf by itself, without the hierarchy above it",
     revision: 1,
-    params: &[],
-    make: |_| Box::new(Flat::default()),
+    params: &[STILL, WHOLE_BELOW],
+    make: |spec| Box::new(Flat { skipping: Skipping::new(spec), ..Flat::default() }),
 };
 
 #[derive(Default)]
 pub struct Flat {
     descent: Descent,
     outside: Vec<u8>,
+    skipping: Skipping,
 }
 
 impl Walk for Flat {
@@ -25,8 +28,20 @@ impl Walk for Flat {
         None
     }
 
+    fn reset(&mut self) {
+        self.skipping.reset();
+    }
+
     fn remembers(&self) -> bool {
         false
+    }
+
+    fn without_judging(&mut self, view: &View, h: &Hierarchy, out: &mut DrawList, tally: &mut Tally) -> bool {
+        self.skipping.skips(view, h, out, tally)
+    }
+
+    fn done(&mut self, view: &View, out: &mut DrawList) {
+        self.skipping.keep(view, out);
     }
 
     fn run(

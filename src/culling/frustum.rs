@@ -14,15 +14,23 @@
 //! f64 at any distance from the origin. Boxes with NaN or infinite bounds are kept.
 //! The arithmetic is a choice between six [`PlaneTest`]s; of `f32_world` alone the
 //! class is aggressive.
+//!
+//! `octant` (`frustum_octant`) is a third acceleration with the same answer; `sat`
+//! (`frustum_sat`) makes the test of boxes exact; `primitive` (`frustum_sphere`) puts a
+//! sphere, or the middle alone, in place of the box. Those are single precision relative
+//! to the camera whatever the axis `arithmetic` says.
 
 use super::frustum_arithmetic::{Ask, PlaneTest, all, bits};
 use super::frustum_exact::Exact;
 use super::frustum_f64::Double;
 use super::frustum_filtered::Filtered;
 use super::frustum_fixed::Fixed;
-use super::frustum_planes::PlaneMasks;
+use super::frustum_octant::{Far, Halves};
+use super::frustum_planes::{PlaneMasks, planes_left};
 use super::frustum_relative::Relative;
 pub use super::frustum_relative::{Kernels, kernels};
+use super::frustum_sat::SeparatingAxes;
+use super::frustum_sphere::{self as sphere, Points, Spheres};
 use super::frustum_volume::Volume;
 use super::frustum_world::World;
 use super::*;
@@ -46,9 +54,24 @@ pub const ENTRY: Entry<dyn Test> = Entry {
             about: "what stands for a node: its box, its BSP partition plane where it has one, or both",
         },
         Param {
+            name: "octant",
+            default: Allowed::Later(&Allowed::Bool(false)),
+            about: "only the planes on whose side of the view a box has its centre are tested (same answer)",
+        },
+        Param {
             name: "plane_mask",
             default: Allowed::Bool(true),
             about: "planes that a node is inside of are not tested for its children (same answer)",
+        },
+        Param {
+            name: PRIMITIVE,
+            default: Allowed::Later(&Allowed::Choice(&[BOX, "sphere", "point"])),
+            about: "what stands for a node's extent: its box, the sphere around that, or its middle alone (aggressive)",
+        },
+        Param {
+            name: "sat",
+            default: Allowed::Later(&Allowed::Bool(false)),
+            about: "boxes that planes do not decide are tested on all separating axes: exact for single boxes",
         },
     ],
     make: |spec| {
@@ -56,7 +79,14 @@ pub const ENTRY: Entry<dyn Test> = Entry {
             node_test: NodeTest::named(spec.text("node_test")),
             plane_mask: spec.bool("plane_mask"),
             last_plane: spec.bool("last_plane"),
+            octant: spec.bool("octant"),
+            sat: spec.bool("sat"),
         };
+        match spec.text(PRIMITIVE) {
+            "sphere" => return Box::new(Frustum::new(options, Spheres::new(sphere::kernels()[0].1))),
+            "point" => return Box::new(Frustum::new(options, Points::new(sphere::kernels()[0].1))),
+            _ => {}
+        }
         match arithmetic_of(spec) {
             Arithmetic::F32Relative => Box::new(Frustum::new(options, Relative::new(kernels()[0]))),
             Arithmetic::F32World => Box::new(Frustum::new(options, World::default())),
@@ -67,6 +97,30 @@ pub const ENTRY: Entry<dyn Test> = Entry {
         }
     },
 };
+
+const PRIMITIVE: &str = "primitive";
+const BOX: &str = "box";
+
+/// Spheres and points know one arithmetic, whatever the axis says.
+pub(super) fn has_one_arithmetic(part: &Spec) -> bool {
+    part.kind == ENTRY.name && matches!(part.params.get(PRIMITIVE), Some(Value::Text(p)) if p != BOX)
+}
+
+/// What the parameters of a resolved spec say together.
+pub(super) fn check(spec: &Spec) -> Result<()> {
+    match spec.params.get(arithmetic::NAME) {
+        Some(stated) if has_one_arithmetic(spec) && *stated != Value::Text(Arithmetic::F32Relative.name().into()) => {
+            let primitive = &spec.params[PRIMITIVE];
+            Err(Error::new(format!(
+                "is {stated}, but `{PRIMITIVE}={primitive}` knows {} alone",
+                Arithmetic::F32Relative
+            ))
+            .key(arithmetic::NAME)
+            .help(format!("leave `{}` out, or take `{PRIMITIVE}={BOX}`", arithmetic::NAME)))
+        }
+        _ => Ok(()),
+    }
+}
 
 /// What stands for a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,6 +147,8 @@ pub struct Options {
     pub node_test: NodeTest,
     pub plane_mask: bool,
     pub last_plane: bool,
+    pub octant: bool,
+    pub sat: bool,
 }
 
 /// Carry while only half-spaces are tested: they never prove "wholly inside".
@@ -104,6 +160,8 @@ pub struct Frustum<P> {
     options: Options,
     boxes: P,
     volume: Volume,
+    halves: Halves,
+    axes: SeparatingAxes,
     /// This frame tests half-spaces, boxes.
     with_planes: bool,
     with_boxes: bool,
@@ -117,6 +175,8 @@ impl<P: PlaneTest> Frustum<P> {
             options,
             boxes,
             volume: Volume::default(),
+            halves: Halves::default(),
+            axes: SeparatingAxes::default(),
             with_planes: false,
             with_boxes: true,
             live: Vec::new(),
@@ -125,36 +185,40 @@ impl<P: PlaneTest> Frustum<P> {
     }
 
     /// Lanes that no plane rejects, in index order.
-    fn in_order(&mut self, hierarchy: &Hierarchy, ask: Ask, masks: &mut PlaneMasks, tally: &mut Tally) -> u8 {
-        self.boxes.block(hierarchy, &ask, masks, tally);
+    #[inline]
+    fn in_order(&mut self, h: &Hierarchy, ask: Ask, far: &Far, masks: &mut PlaneMasks, tally: &mut Tally) -> u8 {
+        self.boxes.block(h, &ask, masks, tally);
         let mut alive = ask.lanes;
         for k in bits(ask.planes) {
-            tally.plane_tests += u64::from(alive.count_ones());
-            alive &= !masks.outside[k];
+            let tested = alive & !far.skip[k];
+            tally.plane_tests += u64::from(tested.count_ones());
+            alive &= !(masks.outside[k] & tested);
         }
         alive
     }
 
     /// The same, each lane starting with the plane that rejected it last.
-    fn last_first(&mut self, hierarchy: &Hierarchy, ask: Ask, masks: &mut PlaneMasks, tally: &mut Tally) -> u8 {
+    #[inline]
+    fn last_first(&mut self, h: &Hierarchy, ask: Ask, far: &Far, masks: &mut PlaneMasks, tally: &mut Tally) -> u8 {
         let last = &mut self.last[ask.block as usize];
         let mut alive = ask.lanes;
-        let first = bits(ask.planes).filter(|k| last[*k] & alive != 0).fold(0, |m, k| m | 1 << k);
+        let first = bits(ask.planes).filter(|k| last[*k] & alive & !far.skip[*k] != 0).fold(0, |m, k| m | 1 << k);
         if first != 0 {
             // A lane's own last plane need not be the first of these.
             let ask = Ask { planes: first, until_rejected: false, ..ask };
-            self.boxes.block(hierarchy, &ask, masks, tally);
+            self.boxes.block(h, &ask, masks, tally);
             for k in bits(first) {
-                tally.plane_tests += u64::from((alive & last[k]).count_ones());
-                alive &= !(masks.outside[k] & last[k]);
+                let tested = alive & last[k] & !far.skip[k];
+                tally.plane_tests += u64::from(tested.count_ones());
+                alive &= !(masks.outside[k] & tested);
             }
             if alive == 0 {
                 return 0;
             }
         }
-        self.boxes.block(hierarchy, &Ask { planes: ask.planes & !first, lanes: alive, ..ask }, masks, tally);
+        self.boxes.block(h, &Ask { planes: ask.planes & !first, lanes: alive, ..ask }, masks, tally);
         for k in bits(ask.planes) {
-            let tested = alive & !last[k];
+            let tested = alive & !last[k] & !far.skip[k];
             tally.plane_tests += u64::from(tested.count_ones());
             let rejected = tested & masks.outside[k];
             if rejected != 0 {
@@ -164,6 +228,34 @@ impl<P: PlaneTest> Frustum<P> {
             }
         }
         alive
+    }
+
+    /// Planes that were left out: a lane is inside if that is certain by itself, or if
+    /// it is asked after all, because nothing else keeps it from being wholly inside.
+    fn inside_of_far(
+        &mut self,
+        h: &Hierarchy,
+        ask: Ask,
+        far: &Far,
+        alive: u8,
+        masks: &mut PlaneMasks,
+        tally: &mut Tally,
+    ) {
+        let mut settled = alive;
+        for k in bits(ask.planes) {
+            masks.inside[k] = masks.inside[k] & !far.skip[k] | far.inside[k];
+            settled &= masks.inside[k] | far.skip[k];
+        }
+        let open = bits(ask.planes).filter(|k| settled & !masks.inside[*k] != 0).fold(0, |m, k| m | 1 << k);
+        if open != 0 {
+            let mut more = PlaneMasks::default();
+            self.boxes.block(h, &Ask { planes: open, lanes: settled, ..ask }, &mut more, tally);
+            for k in bits(open) {
+                let asked = settled & !masks.inside[k];
+                tally.plane_tests += u64::from(asked.count_ones());
+                masks.inside[k] |= more.inside[k] & asked;
+            }
+        }
     }
 
     fn half_spaces(&self, column: &[Option<HalfSpace>], block: u32, alive: u8, tally: &mut Tally) -> u8 {
@@ -207,6 +299,12 @@ impl<P: PlaneTest> Test for Frustum<P> {
         if self.with_planes {
             self.volume = Volume::new(view, hierarchy.origin);
         }
+        if self.options.octant {
+            self.halves = Halves::new(view, hierarchy.origin);
+        }
+        if self.options.sat {
+            self.axes = SeparatingAxes::new(view, hierarchy.origin, !P::BOXES);
+        }
     }
 
     fn initial_carry(&self) -> u8 {
@@ -220,14 +318,30 @@ impl<P: PlaneTest> Test for Frustum<P> {
         if self.with_boxes {
             let mut masks = PlaneMasks::default();
             // Nobody inherits what a block of leaves is inside of.
-            let inside = hierarchy.links[block as usize].child.iter().any(|c| *c != NONE);
-            let ask = Ask { block, lanes: live, planes: carry, inside, until_rejected: true };
+            let inherited = hierarchy.links[block as usize].child.iter().any(|c| *c != NONE);
+            let inside = inherited || self.options.sat;
+            let mut ask = Ask { block, lanes: live, planes: carry, inside, until_rejected: true };
+            let mut far = Far::NONE;
+            if self.options.octant
+                && let Some(known) = self.boxes.far_planes(&self.halves, hierarchy, block)
+            {
+                tally.octant_tests += u64::from(live.count_ones());
+                far = known;
+                ask.planes = far.needed(carry, live);
+            }
             alive = if self.options.last_plane {
-                self.last_first(hierarchy, ask, &mut masks, tally)
+                self.last_first(hierarchy, ask, &far, &mut masks, tally)
             } else {
-                self.in_order(hierarchy, ask, &mut masks, tally)
+                self.in_order(hierarchy, ask, &far, &mut masks, tally)
             };
+            if inside && self.options.octant && alive != 0 {
+                self.inside_of_far(hierarchy, Ask { planes: carry, ..ask }, &far, alive, &mut masks, tally);
+            }
             carries = planes_left(&masks, carry, self.options.plane_mask);
+            if self.options.sat {
+                let open = bits(alive).filter(|l| carries[*l] != 0).fold(0, |m, l| m | 1 << l);
+                alive &= !self.axes.separated(&hierarchy.bounds[block as usize], open, tally);
+            }
         }
         if let (true, Some(column)) = (self.with_planes, &hierarchy.half_spaces) {
             alive = self.half_spaces(column, block, alive, tally);
@@ -236,7 +350,8 @@ impl<P: PlaneTest> Test for Frustum<P> {
     }
 
     fn judge_flat(&mut self, hierarchy: &Hierarchy, outside: &mut [u8], tally: &mut Tally) {
-        if self.options.last_plane || self.with_planes {
+        let Options { last_plane, octant, sat, .. } = self.options;
+        if last_plane || octant || sat || self.with_planes {
             return super::judge_flat_by_block(self, hierarchy, outside, tally);
         }
         let work = self.boxes.flat(hierarchy, &self.live, outside, tally);
@@ -246,53 +361,5 @@ impl<P: PlaneTest> Test for Frustum<P> {
 
     fn failure(&self) -> Option<String> {
         self.boxes.failure()
-    }
-}
-
-/// Carry of each lane: the wanted planes that it is not inside of. Without
-/// `per_plane`, all of them unless it is inside of all.
-fn planes_left(masks: &PlaneMasks, wanted: u8, per_plane: bool) -> [u8; LANES] {
-    // Byte k holds the lanes inside plane k; transposed, byte l holds the planes of lane l.
-    let rows = masks.inside.iter().rev().fold(0, |rows, m| rows << 8 | u64::from(*m));
-    let left = !transpose(rows) & (u64::from(wanted) * 0x0101_0101_0101_0101);
-    let mut carry = left.to_le_bytes();
-    if !per_plane {
-        carry.iter_mut().filter(|c| **c != 0).for_each(|c| *c = wanted);
-    }
-    carry
-}
-
-/// Transposes an 8 x 8 bit matrix, byte = row (Warren, Hacker's Delight, 7-3).
-fn transpose(x: u64) -> u64 {
-    let swap = |x: u64, shift: u32, mask: u64| {
-        let t = (x ^ (x >> shift)) & mask;
-        x ^ t ^ (t << shift)
-    };
-    let x = swap(x, 7, 0x00aa_00aa_00aa_00aa);
-    let x = swap(x, 14, 0x0000_cccc_0000_cccc);
-    swap(x, 28, 0x0000_0000_f0f0_f0f0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn transposing_moves_every_bit_to_its_mirror_place() {
-        for row in 0..8 {
-            for column in 0..8 {
-                assert_eq!(transpose(1 << (row * 8 + column)), 1 << (column * 8 + row));
-            }
-        }
-    }
-
-    #[test]
-    fn a_lane_carries_the_planes_that_it_is_not_inside_of() {
-        let mut masks = PlaneMasks::default();
-        masks.inside[0] = 0b0000_0011;
-        masks.inside[4] = 0b0000_0001;
-        assert_eq!(planes_left(&masks, 0b10001, true), [0, 0b10000, 0b10001, 17, 17, 17, 17, 17]);
-        assert_eq!(planes_left(&masks, 0b10001, false), [0, 17, 17, 17, 17, 17, 17, 17]);
-        assert_eq!(bits(0b1010_0001).collect::<Vec<_>>(), [0, 5, 7]);
     }
 }

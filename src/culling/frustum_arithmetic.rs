@@ -2,6 +2,7 @@
 //! block against the planes of a frame. [`super::frustum`] owns everything else
 //! (masks, last planes, half-spaces), so that those are the same in all of them.
 
+use super::frustum_octant::{Far, Halves};
 use super::frustum_planes::{MAX_PLANES, PlaneMasks, Work};
 use super::{Class, Tally};
 use crate::hierarchy::{Hierarchy, LANES};
@@ -30,6 +31,8 @@ pub struct Ask {
 /// where every step is monotone in the corner's coordinates, as IEEE rounding is.
 pub trait PlaneTest: Send {
     const CLASS: Class;
+    /// It is boxes that are compared with planes, not what stands for them.
+    const BOXES: bool = true;
 
     /// Builds the columns that this arithmetic reads; returns their bytes.
     fn prepare(&mut self, hierarchy: &Hierarchy) -> usize {
@@ -66,6 +69,12 @@ pub trait PlaneTest: Send {
             *out = !left;
         }
         work
+    }
+
+    /// The planes that `block` certainly does not have to be asked about (see
+    /// [`super::frustum_octant`]), where that can be told.
+    fn far_planes(&self, halves: &Halves, hierarchy: &Hierarchy, block: u32) -> Option<Far> {
+        Some(halves.of_boxes(&hierarchy.bounds[block as usize]))
     }
 
     /// As [`super::Test::failure`].

@@ -32,6 +32,7 @@
 //! fused on every target (in software where the processor cannot), so scalar,
 //! AVX2 and AVX-512 give the same bits.
 
+use crate::hierarchy::LANES;
 use crate::math::{DVec3, View};
 
 /// left, right, bottom, top, near, far.
@@ -67,14 +68,8 @@ pub struct FramePlanes {
 
 impl FramePlanes {
     pub fn new(view: &View, origin: DVec3) -> FramePlanes {
-        let mut frame = FramePlanes { count: view.planes.len(), ..Default::default() };
-        let mut rest = DVec3::ZERO;
-        for axis in 0..3 {
-            let (e, error) = two_diff(view.eye[axis], origin[axis]);
-            frame.eye[axis] = e as f32;
-            // Exact: both have at most 53 bits and the difference fewer.
-            rest[axis] = (e - f64::from(frame.eye[axis])) + error;
-        }
+        let (eye, rest) = split_eye(view.eye, origin);
+        let mut frame = FramePlanes { count: view.planes.len(), eye, ..Default::default() };
         for (out, plane) in frame.planes.iter_mut().zip(&view.planes) {
             let d = plane.offset_m - plane.normal.dot(rest);
             // 4u for the three roundings, 2^-48 for f64, 2^-120 for underflow.
@@ -98,6 +93,18 @@ impl FramePlanes {
     }
 }
 
+/// The eye relative to the origin, rounded, and the rest to its last bits.
+pub(super) fn split_eye(eye: DVec3, origin: DVec3) -> ([f32; 3], DVec3) {
+    let (mut rounded, mut rest) = ([0.0; 3], DVec3::ZERO);
+    for axis in 0..3 {
+        let (e, error) = two_diff(eye[axis], origin[axis]);
+        rounded[axis] = e as f32;
+        // Exact: both have at most 53 bits and the difference fewer.
+        rest[axis] = (e - f64::from(rounded[axis])) + error;
+    }
+    (rounded, rest)
+}
+
 /// `a - b` and its rounding error (Knuth).
 pub(super) fn two_diff(a: f64, b: f64) -> (f64, f64) {
     let d = a - b;
@@ -106,12 +113,12 @@ pub(super) fn two_diff(a: f64, b: f64) -> (f64, f64) {
     (d, (a - a_virtual) + (b_virtual - b))
 }
 
-fn up(x: f64) -> f32 {
+pub(super) fn up(x: f64) -> f32 {
     let r = x as f32;
     if f64::from(r) < x { r.next_up() } else { r }
 }
 
-fn down(x: f64) -> f32 {
+pub(super) fn down(x: f64) -> f32 {
     -up(-x)
 }
 
@@ -130,6 +137,30 @@ pub struct Work {
     pub planes: u64,
 }
 
+/// Carry of each lane: the wanted planes that it is not inside of. Without
+/// `per_plane`, all of them unless it is inside of all.
+pub(super) fn planes_left(masks: &PlaneMasks, wanted: u8, per_plane: bool) -> [u8; LANES] {
+    // Byte k holds the lanes inside plane k; transposed, byte l holds the planes of lane l.
+    let rows = masks.inside.iter().rev().fold(0, |rows, m| rows << 8 | u64::from(*m));
+    let left = !transpose(rows) & (u64::from(wanted) * 0x0101_0101_0101_0101);
+    let mut carry = left.to_le_bytes();
+    if !per_plane {
+        carry.iter_mut().filter(|c| **c != 0).for_each(|c| *c = wanted);
+    }
+    carry
+}
+
+/// Transposes an 8 x 8 bit matrix, byte = row (Warren, Hacker's Delight, 7-3).
+fn transpose(x: u64) -> u64 {
+    let swap = |x: u64, shift: u32, mask: u64| {
+        let t = (x ^ (x >> shift)) & mask;
+        x ^ t ^ (t << shift)
+    };
+    let x = swap(x, 7, 0x00aa_00aa_00aa_00aa);
+    let x = swap(x, 14, 0x0000_cccc_0000_cccc);
+    swap(x, 28, 0x0000_0000_f0f0_f0f0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -145,5 +176,24 @@ mod tests {
         let frame = FramePlanes::new(&View::new(&camera, &pose), DVec3::new(10.0, 20.0, 30.0));
         assert_eq!((frame.count, frame.all()), (6, 0b11_1111));
         assert!(frame.planes.iter().all(|p| p.d_in < p.d_out && p.d_out - p.d_in < 1e-3));
+    }
+
+    #[test]
+    fn transposing_moves_every_bit_to_its_mirror_place() {
+        for row in 0..8 {
+            for column in 0..8 {
+                assert_eq!(transpose(1 << (row * 8 + column)), 1 << (column * 8 + row));
+            }
+        }
+    }
+
+    #[test]
+    fn a_lane_carries_the_planes_that_it_is_not_inside_of() {
+        let mut masks = PlaneMasks::default();
+        masks.inside[0] = 0b0000_0011;
+        masks.inside[4] = 0b0000_0001;
+        assert_eq!(planes_left(&masks, 0b10001, true), [0, 0b10000, 0b10001, 17, 17, 17, 17, 17]);
+        assert_eq!(planes_left(&masks, 0b10001, false), [0, 17, 17, 17, 17, 17, 17, 17]);
+        assert_eq!(super::super::frustum_arithmetic::bits(0b1010_0001).collect::<Vec<_>>(), [0, 5, 7]);
     }
 }

@@ -16,6 +16,7 @@
 //! Boxes with a NaN or infinite bound are made NaN altogether, hence kept (B5.4).
 
 use super::frustum_arithmetic::{Ask, PlaneTest};
+use super::frustum_octant::{Far, Halves};
 use super::frustum_planes::{FramePlanes, Plane32, PlaneMasks, Work};
 use super::frustum_relative::{Kernels, kernels_of};
 use super::{Class, Tally};
@@ -120,5 +121,10 @@ impl PlaneTest for World {
 
     fn flat(&mut self, _: &Hierarchy, live: &[u8], outside: &mut [u8], _: &mut Tally) -> Work {
         (self.kernels.flat)(&self.frame, &self.bounds[..outside.len()], live, outside)
+    }
+
+    /// Planes that err may reject what they must not, also on the far side.
+    fn far_planes(&self, _: &Halves, _: &Hierarchy, _: u32) -> Option<Far> {
+        None
     }
 }

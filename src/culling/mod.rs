@@ -22,9 +22,14 @@ pub mod frustum_filtered;
 pub mod frustum_fixed;
 #[cfg(target_arch = "x86_64")]
 pub mod frustum_fixed_x86;
+pub mod frustum_octant;
 pub mod frustum_planes;
 pub mod frustum_relative;
+pub mod frustum_sat;
 pub mod frustum_scalar;
+pub mod frustum_sphere;
+#[cfg(target_arch = "x86_64")]
+pub mod frustum_sphere_x86;
 pub mod frustum_volume;
 pub mod frustum_world;
 #[cfg(target_arch = "x86_64")]
@@ -36,17 +41,21 @@ mod normal_mask_local;
 pub mod octant_mask;
 #[cfg(target_arch = "x86_64")]
 mod prefetch_x86;
+mod saturation;
 pub mod sector;
 #[cfg(target_arch = "x86_64")]
 pub mod sector_x86;
+mod skipping;
+mod tally;
 pub mod triangle_words;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::hierarchy::Hierarchy;
 use crate::math::{Arithmetic, View, arithmetic};
 use crate::registry::{Default as Allowed, Entry, Param, Spec, Value, find};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
+pub use tally::Tally;
 
 /// What a method promises of its submitted set S against the visible set V*.
 /// The order is from the strongest promise to the weakest.
@@ -131,7 +140,8 @@ pub trait Test: Send {
 }
 
 /// One frame: tests begin, the walk visits nodes, tests of triangles go through
-/// what is left.
+/// what is left; unless the walk needs none of that. Into the same `out` every frame,
+/// a walk finds what the last one left there.
 #[inline]
 pub fn cull(
     view: &View,
@@ -141,6 +151,9 @@ pub fn cull(
     out: &mut DrawList,
     tally: &mut Tally,
 ) {
+    if walk.without_judging(view, hierarchy, out, tally) {
+        return;
+    }
     out.clear();
     for test in tests.iter_mut() {
         test.begin(view, hierarchy);
@@ -149,6 +162,7 @@ pub fn cull(
     for test in tests.iter_mut() {
         test.filter(hierarchy, out, tally);
     }
+    walk.done(view, out);
 }
 
 /// [`Test::judge_flat`] by way of [`Test::judge`].
@@ -178,6 +192,17 @@ pub trait Walk: Send {
     fn remembers(&self) -> bool {
         true
     }
+    /// Before anything of a frame: if the walk can tell what to draw although nothing is
+    /// judged, it leaves that in `out`, what the last frame left there or not, and says so.
+    fn without_judging(&mut self, view: &View, hierarchy: &Hierarchy, out: &mut DrawList, tally: &mut Tally) -> bool {
+        let _ = (view, hierarchy, out, tally);
+        false
+    }
+    /// After a frame that was judged, tests of triangles included. Between two resets a
+    /// walk serves one hierarchy and one sum of tests.
+    fn done(&mut self, view: &View, out: &mut DrawList) {
+        let _ = (view, out);
+    }
     /// Appends what to draw for this frame. `tests` have begun the frame.
     fn run(
         &mut self,
@@ -190,19 +215,32 @@ pub trait Walk: Send {
 }
 
 /// What a frame submits: ranges of entry positions, merged when contiguous.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default)]
 pub struct DrawList {
+    /// Written by the methods below, which withdraw the `stamp`.
     pub ranges: Vec<(u32, u32)>,
     /// Triangles were judged one by one, so what is drawn is an index list written
     /// anew this frame: ranges of one material follow each other in it without a gap.
     pub compacted: bool,
     spare: Vec<(u32, u32)>,
+    /// Number of the judged frame whose list this is, as long as nobody wrote to it
+    /// since; 0 if a walk did not ask for one.
+    stamp: u64,
 }
+
+impl PartialEq for DrawList {
+    fn eq(&self, other: &DrawList) -> bool {
+        (&self.ranges, self.compacted) == (&other.ranges, other.compacted)
+    }
+}
+
+impl Eq for DrawList {}
 
 impl DrawList {
     pub fn clear(&mut self) {
         self.ranges.clear();
         self.compacted = false;
+        self.stamp = 0;
     }
 
     /// Keeps the positions that `keep` says yes to and marks the list as compacted.
@@ -210,6 +248,7 @@ impl DrawList {
     pub fn retain(&mut self, mut keep: impl FnMut(u32) -> bool) {
         let before = std::mem::replace(&mut self.ranges, std::mem::take(&mut self.spare));
         self.ranges.clear();
+        self.stamp = 0;
         for (first, end) in &before {
             for position in (*first..*end).filter(|p| keep(*p)) {
                 self.push(position, position + 1);
@@ -224,6 +263,7 @@ impl DrawList {
         if first == end {
             return;
         }
+        self.stamp = 0;
         match self.ranges.last_mut() {
             Some(last) if last.1 == first => last.1 = end,
             _ => self.ranges.push((first, end)),
@@ -258,57 +298,6 @@ impl DrawList {
     }
 }
 
-/// Work of one frame. Bit-identical between repeats, threads and instruction sets.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Tally {
-    /// Nodes judged (lanes that were asked about), each once a frame.
-    pub nodes_visited: u64,
-    /// Lanes handed to a test, summed over tests.
-    pub lane_tests: u64,
-    /// Planes compared with a box, a lane each.
-    pub plane_tests: u64,
-    /// Normal or octant masks compared.
-    pub mask_tests: u64,
-    /// Triangles judged one by one.
-    pub triangle_tests: u64,
-    /// Signs asked of a `filtered` predicate, and those that single precision, then
-    /// double precision too, could not tell.
-    pub predicates: u64,
-    pub fallbacks_f64: u64,
-    pub fallbacks_exact: u64,
-}
-
-impl std::iter::Sum for Tally {
-    fn sum<I: Iterator<Item = Tally>>(tallies: I) -> Tally {
-        tallies.fold(Tally::default(), |a, b| Tally {
-            nodes_visited: a.nodes_visited + b.nodes_visited,
-            lane_tests: a.lane_tests + b.lane_tests,
-            plane_tests: a.plane_tests + b.plane_tests,
-            mask_tests: a.mask_tests + b.mask_tests,
-            triangle_tests: a.triangle_tests + b.triangle_tests,
-            predicates: a.predicates + b.predicates,
-            fallbacks_f64: a.fallbacks_f64 + b.fallbacks_f64,
-            fallbacks_exact: a.fallbacks_exact + b.fallbacks_exact,
-        })
-    }
-}
-
-impl Tally {
-    /// Name, unit and value of every counter: counters are data.
-    pub fn named(&self) -> [(&'static str, &'static str, u64); 8] {
-        [
-            ("nodes_visited", "nodes", self.nodes_visited),
-            ("lane_tests", "lanes", self.lane_tests),
-            ("plane_tests", "planes", self.plane_tests),
-            ("mask_tests", "masks", self.mask_tests),
-            ("triangle_tests", "triangles", self.triangle_tests),
-            ("predicates", "signs", self.predicates),
-            ("fallbacks_f64", "signs", self.fallbacks_f64),
-            ("fallbacks_exact", "signs", self.fallbacks_exact),
-        ]
-    }
-}
-
 /// Sorted by name.
 pub static TESTS: &[Entry<dyn Test>] = &[
     back_face::ENTRY,
@@ -326,6 +315,13 @@ pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, flat::ENTRY];
 /// The parts of a sum, made, and their resolved specs.
 pub type Sum = (Vec<Box<dyn Test>>, Vec<Spec>);
 
+/// Finds and checks a test, also what its parameters say together.
+pub fn find_test(spec: &Spec) -> Result<(&'static Entry<dyn Test>, Spec)> {
+    let (entry, resolved) = find("culling test", TESTS, spec)?;
+    frustum::check(&resolved)?;
+    Ok((entry, resolved))
+}
+
 /// The tests that `specs` name, in order, with defaults filled in.
 pub fn make_tests(specs: &[Spec]) -> Result<Sum> {
     make_tests_in(specs, Arithmetic::default())
@@ -337,7 +333,7 @@ pub fn make_tests_in(specs: &[Spec], arithmetic: Arithmetic) -> Result<Sum> {
     let mut tests = Vec::new();
     let mut resolved = Vec::new();
     for spec in specs {
-        let (entry, spec) = find("culling test", TESTS, spec)?;
+        let (entry, spec) = find_test(spec)?;
         let mut own = spec.clone();
         state_arithmetic(&mut own, arithmetic);
         tests.push(entry.build(&own));
@@ -348,16 +344,16 @@ pub fn make_tests_in(specs: &[Spec], arithmetic: Arithmetic) -> Result<Sum> {
 
 /// Writes `arithmetic` into a part that takes one and states none.
 pub fn state_arithmetic(part: &mut Spec, arithmetic: Arithmetic) {
-    if knows_arithmetic(&part.kind) {
+    if knows_arithmetic(part) {
         let stated = || Value::Text(arithmetic.name().to_string());
         part.params.entry(arithmetic::NAME.to_string()).or_insert_with(stated);
     }
 }
 
-/// Whether the test `kind` is evaluated in the arithmetic of the axis.
-pub fn knows_arithmetic(kind: &str) -> bool {
-    let entry = TESTS.iter().find(|e| e.name == kind);
-    entry.is_some_and(|e| e.params.iter().any(|p| p.name == arithmetic::NAME))
+/// Whether the test `part` is evaluated in the arithmetic of the axis.
+pub fn knows_arithmetic(part: &Spec) -> bool {
+    let entry = TESTS.iter().find(|e| e.name == part.kind);
+    entry.is_some_and(|e| e.params.iter().any(|p| p.name == arithmetic::NAME)) && !frustum::has_one_arithmetic(part)
 }
 
 /// The parameter of tests that know arithmetics.

@@ -15,7 +15,8 @@
 //! What we changed: guards. The axis is rounded to f32 *before* the angle is measured from
 //! it, `sin a`, `R` are rounded up, everything else is f64, and the test asks for
 //! `16u (L + R)` more. A node with a two-sided triangle, a sliver, a triangle without area,
-//! or normals over 84 degrees from the axis has no cone. The axis is the centre of a small
+//! or normals over 84 degrees from the axis has no cone, and no node above it: that is to
+//! cones what `saturation` is to masks, and always on. The axis is the centre of a small
 //! ball around the normals, found by the iteration of Badoiu & Clarkson (2003).
 
 use super::facing_columns::trusted_normal;

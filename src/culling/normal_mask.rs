@@ -22,7 +22,8 @@
 //! therefore removes back-facing triangles **and** triangles outside the frustum.
 //!
 //! `rays = "node"` (`normal_mask_local`) takes the rays from the eye to the node's box in
-//! place of those of the whole view.
+//! place of those of the whole view. `saturation` leaves nodes out whose masks are
+//! nearly full; one with the reserved bit, which no view averts, counts as full.
 //!
 //! The guard of `8 * 2^-24` relative to `|q||r|` exceeds the direction error of an
 //! f64 normal by 400 for all but slivers; slivers, degenerate triangles (no normal)
@@ -30,6 +31,7 @@
 
 use super::facing_columns::trusted_normal;
 use super::normal_mask_local::Local;
+use super::saturation::{SATURATION, Saturation};
 use super::*;
 use crate::hierarchy::{LANES, NONE};
 use crate::math::DVec3;
@@ -53,10 +55,12 @@ pub const ENTRY: Entry<dyn Test> = Entry {
             default: Allowed::Later(&Allowed::Choice(&["view", "node"])),
             about: "what a cell is averted from: all rays of the view, or only those from the eye to the node's box",
         },
+        SATURATION,
     ],
     make: |spec| {
         let local = spec.text("rays") == "node";
-        Box::new(NormalMask::new(spec.int("cells") as usize).with_rays_to_nodes(local))
+        let test = NormalMask::new(spec.int("cells") as usize).with_rays_to_nodes(local);
+        Box::new(test.with_saturation(spec.float("saturation")))
     },
 };
 
@@ -153,6 +157,7 @@ pub struct NormalMask {
     all_front: bool,
     /// Rays to the nodes' boxes decide, not those of the view.
     local: Option<Local>,
+    saturation: Option<Saturation>,
 }
 
 impl NormalMask {
@@ -168,6 +173,7 @@ impl NormalMask {
             front: vec![!0; cells.words()],
             all_front: true,
             local: None,
+            saturation: None,
         }
     }
 
@@ -175,9 +181,22 @@ impl NormalMask {
     pub fn with_rays_to_nodes(self, yes: bool) -> NormalMask {
         NormalMask { local: yes.then(|| Local::new(self.cells)), ..self }
     }
-}
 
-impl NormalMask {
+    /// The same without asking nodes whose masks have at least this share of their bits;
+    /// 0 asks all.
+    pub fn with_saturation(self, share: f64) -> NormalMask {
+        NormalMask { saturation: Saturation::new(share), ..self }
+    }
+
+    /// Share of a node's bits; all if one of them is the reserved one.
+    fn share(&self, block: usize, lane: usize) -> f64 {
+        let (words, cells) = (self.cells.words(), self.cells.count());
+        let mask = &self.masks[block * words..][..words];
+        let reserved = mask[cells / 64][lane] >> (cells % 64) & 1 == 1;
+        let bits: u32 = mask.iter().map(|w| w[lane].count_ones()).sum();
+        if reserved { 1.0 } else { f64::from(bits) / cells as f64 }
+    }
+
     fn is_local(&self) -> bool {
         self.local.as_ref().is_some_and(Local::is_perspective)
     }
@@ -215,7 +234,10 @@ impl Test for NormalMask {
                 }
             }
         });
-        size_of_val(&self.masks[..])
+        let mut saturation = self.saturation.take();
+        let bytes = saturation.as_mut().map_or(0, |s| s.prepare(hierarchy, |block, lane| self.share(block, lane)));
+        self.saturation = saturation;
+        bytes + size_of_val(&self.masks[..])
     }
 
     fn begin(&mut self, view: &View, hierarchy: &Hierarchy) {
@@ -250,16 +272,31 @@ impl Test for NormalMask {
     }
 
     fn judge(&mut self, hierarchy: &Hierarchy, block: u32, live: u8, _carry: u8, tally: &mut Tally) -> Verdict {
-        let lanes = u64::from(live.count_ones());
-        tally.lane_tests += lanes;
-        tally.mask_tests += lanes;
-        let words = self.front.len();
-        if let (true, Some(local)) = (self.is_local(), &self.local) {
+        tally.lane_tests += u64::from(live.count_ones());
+        let asked = self.saturation.as_ref().map_or(live, |s| s.asked(block, live, tally));
+        tally.mask_tests += u64::from(asked.count_ones());
+        let mut verdict = if asked == 0 {
+            Verdict { outside: 0, carry: [0; LANES] }
+        } else if let (true, Some(local)) = (self.is_local(), &self.local) {
+            let words = self.front.len();
             let masks = &self.masks[block as usize * words..][..words];
-            let outside = local.outside(&hierarchy.bounds[block as usize], masks, live);
             // Smaller boxes below may be averted though this one is not.
-            return Verdict { outside, carry: [1; LANES] };
+            let outside = local.outside(&hierarchy.bounds[block as usize], masks, asked);
+            Verdict { outside, carry: [1; LANES] }
+        } else {
+            self.against_view(block)
+        };
+        verdict.outside &= live;
+        if let Some(saturation) = &self.saturation {
+            saturation.keep_others(block, asked, &mut verdict);
         }
+        verdict
+    }
+}
+
+impl NormalMask {
+    fn against_view(&self, block: u32) -> Verdict {
+        let words = self.front.len();
         let (mut facing, mut averted) = ([0u64; LANES], [0u64; LANES]);
         for (masks, front) in self.masks[block as usize * words..][..words].iter().zip(&self.front) {
             for lane in 0..LANES {
@@ -273,7 +310,6 @@ impl Test for NormalMask {
             // All cells front here: then also in every subset below.
             verdict.carry[lane] = u8::from(averted[lane] != 0);
         }
-        verdict.outside &= live;
         verdict
     }
 }

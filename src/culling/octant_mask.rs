@@ -15,6 +15,7 @@
 //! plain `atan2(0, 0) = 0` would lose all floors for a camera that looks along +x.
 //! A camera that looks straight up or down averts nothing.
 
+use super::saturation::{SATURATION, Saturation};
 use super::*;
 use crate::hierarchy::{LANES, NONE};
 use crate::math::DVec3;
@@ -26,12 +27,18 @@ pub const ENTRY: Entry<dyn Test> = Entry {
     name: "octant_mask",
     about: "skip nodes whose normals point away by azimuth alone (Serpa & Rodrigues 2014; aggressive)",
     revision: 1,
-    params: &[Param {
-        name: "sectors",
-        default: Allowed::Choice(&["8", "4", "16"]),
-        about: "sectors of the horizontal circle",
-    }],
-    make: |spec| Box::new(OctantMask::new(spec.text("sectors").parse().expect("choices are numbers"))),
+    params: &[
+        SATURATION,
+        Param {
+            name: "sectors",
+            default: Allowed::Choice(&["8", "4", "16"]),
+            about: "sectors of the horizontal circle",
+        },
+    ],
+    make: |spec| {
+        let test = OctantMask::new(spec.text("sectors").parse().expect("choices are numbers"));
+        Box::new(test.with_saturation(spec.float("saturation")))
+    },
 };
 
 /// Sector of the horizontal part of `v`, or `None` if it has none.
@@ -57,12 +64,19 @@ pub struct OctantMask {
     sectors: u32,
     masks: Vec<[u16; LANES]>,
     averted: u16,
+    saturation: Option<Saturation>,
 }
 
 impl OctantMask {
     pub fn new(sectors: u32) -> OctantMask {
         assert!(matches!(sectors, 4 | 8 | 16), "the registry offers 4, 8 and 16 sectors");
-        OctantMask { sectors, masks: Vec::new(), averted: 0 }
+        OctantMask { sectors, masks: Vec::new(), averted: 0, saturation: None }
+    }
+
+    /// The same without asking nodes whose masks have at least this share of their bits;
+    /// 0 asks all.
+    pub fn with_saturation(self, share: f64) -> OctantMask {
+        OctantMask { saturation: Saturation::new(share), ..self }
     }
 
     fn of_triangle(&self, scene: &Scene, t: u32) -> u16 {
@@ -98,7 +112,10 @@ impl Test for OctantMask {
             masks[block][lane] = mask;
         });
         self.masks = masks;
-        size_of_val(&self.masks[..])
+        let share =
+            |block: usize, lane: usize| f64::from(self.masks[block][lane].count_ones()) / f64::from(self.sectors);
+        let bytes = self.saturation.as_mut().map_or(0, |s| s.prepare(hierarchy, share));
+        bytes + size_of_val(&self.masks[..])
     }
 
     fn begin(&mut self, view: &View, _hierarchy: &Hierarchy) {
@@ -110,9 +127,9 @@ impl Test for OctantMask {
     }
 
     fn judge(&mut self, _: &Hierarchy, block: u32, live: u8, _carry: u8, tally: &mut Tally) -> Verdict {
-        let lanes = u64::from(live.count_ones());
-        tally.lane_tests += lanes;
-        tally.mask_tests += lanes;
+        tally.lane_tests += u64::from(live.count_ones());
+        let asked = self.saturation.as_ref().map_or(live, |s| s.asked(block, live, tally));
+        tally.mask_tests += u64::from(asked.count_ones());
         let mut verdict = Verdict { outside: 0, carry: [0; LANES] };
         for (lane, mask) in self.masks[block as usize].iter().enumerate() {
             verdict.outside |= u8::from(mask & !self.averted == 0) << lane;
@@ -120,6 +137,9 @@ impl Test for OctantMask {
             verdict.carry[lane] = u8::from(mask & self.averted != 0);
         }
         verdict.outside &= live;
+        if let Some(saturation) = &self.saturation {
+            saturation.keep_others(block, asked, &mut verdict);
+        }
         verdict
     }
 }

@@ -57,7 +57,7 @@ pub static AXES: &[Axis] = &[
         settled: None,
         complete: None,
         parts: || parts(culling::TESTS),
-        check: |spec| find("culling test", culling::TESTS, spec).map(|(_, s)| s),
+        check: |spec| culling::find_test(spec).map(|(_, s)| s),
     },
     Axis {
         name: "walk",
@@ -106,7 +106,7 @@ fn arithmetic_named(spec: &Spec) -> Result<Spec> {
 
 /// Where no part of the culling takes the axis, all its values are the same work.
 fn arithmetic_for(culling: &[Spec]) -> Option<Spec> {
-    let takes = |s: &Spec| culling::knows_arithmetic(&s.kind) && !s.params.contains_key(arithmetic::NAME);
+    let takes = |s: &Spec| culling::knows_arithmetic(s) && !s.params.contains_key(arithmetic::NAME);
     (!culling.iter().any(takes)).then(|| Spec::new(Arithmetic::default().name()))
 }
 

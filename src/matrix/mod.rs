@@ -191,7 +191,7 @@ fn build(manifest: &Manifest, setting: &Setting, pool: &Pool, cell: &Cell) -> Ru
     }
     // The usual arithmetic is not named either; its first revision is in no id.
     let usual = Arithmetic::default();
-    let takes_usual = |part: &&Spec| knows_arithmetic(&part.kind) && stated_arithmetic(part).is_none();
+    let takes_usual = |part: &&Spec| knows_arithmetic(part) && stated_arithmetic(part).is_none();
     if usual.revision() > 1
         && !others.contains_key(arithmetic::NAME)
         && named["culling"].iter().any(|p| takes_usual(&p))

@@ -24,7 +24,7 @@ pub struct Names {
 /// The arithmetic in which the run's tests are evaluated: what their parts state, else
 /// the axis' value; `takes none` where no part knows arithmetics.
 pub fn arithmetic(run: &RunResult) -> String {
-    let parts = run.spec.culling.iter().filter(|part| culling::knows_arithmetic(&part.kind));
+    let parts = run.spec.culling.iter().filter(|part| culling::knows_arithmetic(part));
     let of = |part: &Spec| match part.params.get(NAME) {
         Some(stated) => stated.to_string(),
         None => format_sum(&axis_value(&run.spec, NAME)),

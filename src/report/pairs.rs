@@ -45,7 +45,7 @@ pub fn groups<'a>(results: &'a StudyResults, claim: &Claim) -> Vec<Pairs<'a>> {
     let arithmetic = |run: &RunResult| format_sum(&axis_value(&run.spec, "arithmetic"));
     let all: BTreeSet<String> = results.runs.iter().map(arithmetic).collect();
     let keys = |run: &RunResult| -> BTreeSet<String> {
-        let takes = run.spec.culling.iter().any(|part| culling::knows_arithmetic(&part.kind));
+        let takes = run.spec.culling.iter().any(culling::knows_arithmetic);
         if takes { BTreeSet::from([free(run, &arithmetic(run))]) } else { all.iter().map(|a| free(run, a)).collect() }
     };
     let mut partners: BTreeMap<String, Vec<&RunResult>> = BTreeMap::new();

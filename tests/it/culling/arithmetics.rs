@@ -97,12 +97,12 @@ pub fn boxes_for(rng: &mut Rng, view: &View, origin: DVec3, count: usize) -> Vec
     boxes
 }
 
-fn corner(b: &Box32, normal: DVec3, far: bool) -> DVec3 {
+pub fn corner(b: &Box32, normal: DVec3, far: bool) -> DVec3 {
     let along = normal.cmpge(DVec3::ZERO);
     DVec3::select(if far { along } else { !along }, b.hi.as_dvec3(), b.lo.as_dvec3())
 }
 
-fn finite(b: &Box32) -> bool {
+pub fn finite(b: &Box32) -> bool {
     b.lo.is_finite() && b.hi.is_finite()
 }
 
@@ -127,7 +127,7 @@ fn exact_signs_are_those_of_whole_numbers() {
 }
 
 /// Outside and inside masks of all boxes and planes.
-fn masks<P: PlaneTest>(mut test: P, h: &Hierarchy, view: &View, tally: &mut Tally) -> Vec<PlaneMasks> {
+pub fn masks<P: PlaneTest>(mut test: P, h: &Hierarchy, view: &View, tally: &mut Tally) -> Vec<PlaneMasks> {
     test.prepare(h);
     test.begin(view, h);
     let planes = all(test.planes());

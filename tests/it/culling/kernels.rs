@@ -65,7 +65,7 @@ pub fn nasty_boxes(rng: &mut Rng, count: usize) -> Vec<Box32> {
         .collect()
 }
 
-fn frames(rng: &mut Rng) -> Vec<FramePlanes> {
+pub fn frames(rng: &mut Rng) -> Vec<FramePlanes> {
     let square = Pose { eye: DVec3::ZERO, forward: DVec3::X, up: DVec3::Z };
     let far = Camera { far_m: Some(12.0), ..camera(70.0, 1.5) };
     let ortho = Camera { projection: Projection::Orthographic { height_m: 10.0 }, ..Camera::default() };

@@ -50,7 +50,7 @@ pub fn triangles(h: &Hierarchy, out: &DrawList) -> Vec<bool> {
     set
 }
 
-fn views(seed: u64, half: f64) -> Vec<View> {
+pub fn views(seed: u64, half: f64) -> Vec<View> {
     let mut rng = Rng::new(seed);
     let ortho = Camera { projection: Projection::Orthographic { height_m: half }, ..Camera::default() };
     let far = Camera { far_m: Some(half), ..camera(40.0, 1.0) };
