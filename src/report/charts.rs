@@ -1,6 +1,7 @@
 //! The charts of a report, in the order of the page.
 
 use super::claims::Judged;
+use super::correlation;
 use super::curves::{self, Curves};
 use super::figure::Figure;
 use super::forest;
@@ -17,6 +18,7 @@ pub fn all(grid: &Grid, judged: &[Judged]) -> Vec<Figure> {
         return Vec::new();
     }
     let mut figures = vec![total_model(grid), total_time(grid), time_per_frame(grid), triangles_per_frame(grid)];
+    figures.extend(correlation::draw(grid));
     if grid.runs().any(|r| !r.errors.is_empty()) {
         figures.extend(errors(grid));
     }

@@ -14,7 +14,7 @@ use super::table::{Cell, Column, Table, column, interval, number};
 use crate::results::{RunResult, RunStatus};
 
 /// A run with the index of its combination.
-type Of<'a> = (usize, &'a RunResult);
+pub(super) type Of<'a> = (usize, &'a RunResult);
 
 /// The key findings, one sentence each; plain text.
 pub fn findings(grid: &Grid, judged: &[Judged]) -> Vec<String> {
@@ -38,7 +38,7 @@ fn frame() -> &'static Metric {
 }
 
 /// The shortest modelled frame at a place among the sound methods, or among the others.
-fn best<'a>(grid: &'a Grid, place: usize, sound: bool) -> Option<Of<'a>> {
+pub(super) fn best<'a>(grid: &'a Grid, place: usize, sound: bool) -> Option<Of<'a>> {
     let candidates = done(grid, place).filter(|(_, r)| may_lose(r) != sound);
     let timed = candidates.filter_map(|c| Some((c, frame().value(c.1)?)));
     timed.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(c, _)| c)

@@ -2,6 +2,8 @@
 
 #[path = "report/axes.rs"]
 mod axes;
+#[path = "report/best.rs"]
+mod best;
 #[path = "report/columns.rs"]
 mod columns;
 #[path = "report/fixture.rs"]
@@ -10,6 +12,8 @@ mod fixture;
 mod frontier;
 #[path = "report/own_values.rs"]
 mod own_values;
+#[path = "report/rates.rs"]
+mod rates;
 #[path = "report/repeatability.rs"]
 mod repeatability;
 #[path = "report/sweeps.rs"]
@@ -42,6 +46,7 @@ fn figures(results: &StudyResults) -> Vec<Figure> {
 fn a_report_is_one_page_with_charts_and_tables_and_the_same_bytes_again() {
     if let Some(dir) = std::env::var_os(KEEP) {
         report::write(&fixture::large(), &fixture::claims(), Path::new(&dir)).unwrap();
+        report::write(&fixture::wide(), &fixture::claims(), &Path::new(&dir).join("wide")).unwrap();
     }
     let (a, b) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     // Small and pale: PNGs of a debug build are slow.
@@ -49,7 +54,7 @@ fn a_report_is_one_page_with_charts_and_tables_and_the_same_bytes_again() {
     results.title = "A <script>alert('x')</script> & \"quotes\"".into();
     let files = report::write(&results, &fixture::claims(), a.path()).unwrap();
     report::write(&results, &fixture::claims(), b.path()).unwrap();
-    assert_eq!(files.charts.len(), 20, "{:?}", files.charts);
+    assert_eq!(files.charts.len(), 22, "{:?}", files.charts);
     for file in files.charts.iter().chain(&files.tables).chain([&files.page]) {
         let other = b.path().join(file.strip_prefix(a.path()).unwrap());
         assert!(std::fs::read(file).unwrap() == std::fs::read(&other).unwrap(), "{} differs", file.display());
@@ -63,7 +68,7 @@ fn a_report_is_one_page_with_charts_and_tables_and_the_same_bytes_again() {
         let around = &page[i.saturating_sub(40)..i + 30];
         assert!(around.contains("xmlns=") || around.contains("http-equiv"), "{around}");
     }
-    for id in ["findings", "claims-section", "gaps", "times-section", "errors-section", "methods"] {
+    for id in ["findings", "claims-section", "gaps", "times-section", "rates-section", "errors-section", "methods"] {
         assert!(page.contains(&format!("<section id=\"{id}\"")), "{id}");
     }
     for words in
@@ -83,7 +88,8 @@ fn svgs_are_xml_and_name_every_scene_and_combination() {
         for place in &grid.places {
             assert!(texts.iter().any(|t| t == place), "{} lacks {place}", figure.id);
         }
-        if figure.id != "claims" {
+        // Of claims, and of the best of each scene alone.
+        if !["claims", "triangles-against-time"].contains(&figure.id.as_str()) {
             // By its whole label, or by its structure and its culling.
             let has = |name: &str| texts.iter().any(|t| t == name);
             for (label, entry) in grid.combinations.iter().zip(&grid.legend.entries) {
@@ -278,6 +284,11 @@ fn an_interval_decides_a_claim_only_when_it_lies_on_one_side() {
         (Relation::Grows, (0.2, 0.9), Reproduced),
         (Relation::Grows, (-0.2, 0.9), Undecided),
         (Relation::Greater, (f64::NAN, f64::NAN), Undecided),
+        (Relation::Best, (0.7, 0.99), Reproduced),
+        (Relation::Best, (0.9, 1.1), Undecided),
+        // Level with the best of the rest.
+        (Relation::Best, (1.0, 1.0), Undecided),
+        (Relation::Best, (1.01, 1.2), Contradicted),
     ] {
         let found = decide(relation, published, 0.2, ((low + high) / 2.0, low, high));
         assert_eq!(found, expected, "{relation:?} [{low}, {high}]");

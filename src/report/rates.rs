@@ -1,0 +1,107 @@
+//! Tables of frames per second and of how time goes with triangles, in the form of Silva
+//! (2009): who is best in each scene, and every run, the fastest of its scene first. Runs
+//! without a structure, or of one, are a selection of the second table's rows.
+
+use super::findings::best;
+use super::labels::Grid;
+use super::metrics::known;
+use super::table::{Cell, Column, Table, number};
+use super::tables::{cell, class_of, named, of};
+use crate::results::RunResult;
+use std::cmp::Ordering;
+
+/// Metrics with the headings of their columns.
+const RATES: [(&str, &str); 3] = [
+    ("fps_best_model", "best, modelled"),
+    ("fps_worst_model", "worst, modelled"),
+    ("fps_mean_model", "mean, modelled"),
+];
+const CORRELATIONS: [(&str, &str); 4] = [
+    ("pearson_triangles_cull", "r, culling"),
+    ("spearman_triangles_cull", "rank r, culling"),
+    ("partial_triangles_cull", "r, culling, given nodes"),
+    ("pearson_triangles_frame_model", "r, frame modelled"),
+];
+const LOST: (&str, &str) = ("false_cull_ppm", "false-cull pixels");
+
+/// For the page, above the tables.
+pub const WORDS: &str = "Frames per second are derived from the modelled frame, culling plus drawing, and never measured: \
+    best and worst are the fastest and the slowest frame, the mean is frames over total time and not the mean of rates. \
+    r is the correlation of triangles submitted with time over the frames of a run, rank r that of their ranks (Spearman). \
+    Given nodes: with the nodes visited held constant, what is left of it. The modelled frame holds the triangles itself, so its r \
+    is high by construction; that of culling time is measured. Where triangles do not vary there is none.";
+
+/// Only the mean carries its interval to the page: eight of them would bury the numbers.
+fn column_of(name: &str, heading: &str) -> Column {
+    let mut column = of(known(name), heading);
+    column.interval = name == "fps_mean_model";
+    column
+}
+
+fn value_of(name: &str, run: &RunResult) -> Cell {
+    if name == "fps_mean_model" { cell(known(name), run) } else { number(known(name).value(run)) }
+}
+
+fn metrics() -> impl Iterator<Item = (&'static str, &'static str)> {
+    RATES.into_iter().chain(CORRELATIONS).chain([LOST])
+}
+
+/// By scene: the shortest modelled frame among sound methods and, where one that may lose
+/// triangles models a shorter one still, that.
+pub fn best_table(grid: &Grid) -> Table {
+    let mut columns = vec![
+        Column::text("scene"),
+        column_of("scene_triangles", "triangles"),
+        Column::text("best combination"),
+        Column::text("walk"),
+        Column::text("class"),
+    ];
+    columns.extend(metrics().map(|(name, heading)| column_of(name, heading)));
+    let title = "Frames per second (modelled) of the best combination, scene by scene";
+    let mut table = Table::new("rates-best", title, 1, columns);
+    for (place, scene) in grid.places.iter().enumerate() {
+        let (sound, bold) = (best(grid, place, true), best(grid, place, false));
+        let frame = |run: &RunResult| known("frame_ms_model").value(run).unwrap_or(f64::INFINITY);
+        let shorter = |b: &RunResult| sound.is_none_or(|(_, s)| frame(b) < frame(s));
+        for (c, run) in sound.into_iter().chain(bold.filter(|(_, b)| shorter(b))) {
+            let mut row = vec![
+                Cell::Text(scene.clone()),
+                number(known("scene_triangles").value(run)),
+                Cell::Named(grid.combinations[c].clone(), grid.legend.entries[c].look),
+                Cell::Text(run.walk.clone()),
+                class_of(run),
+            ];
+            row.extend(metrics().map(|(name, _)| value_of(name, run)));
+            table.rows.push(row);
+        }
+    }
+    table.caption = "The combination with the shortest modelled frame that must not lose visible triangles; below it, \
+                     where it models a shorter one still, the best that may (†). Brackets: 95 % bootstrap interval of the \
+                     median over trials."
+        .into();
+    table
+}
+
+/// Every run: scene by scene, by mean rate; what has no rate comes last.
+pub fn all(grid: &Grid) -> Table {
+    let mut columns = vec![Column::text("scene"), Column::text("combination"), Column::text("status")];
+    columns.push(Column::text("class"));
+    columns.extend(metrics().map(|(name, heading)| column_of(name, heading)));
+    let mut table = Table::new("rates", "Frames per second (modelled) and correlations of every run", 2, columns);
+    let mean = |run: &RunResult| known("fps_mean_model").value(run).unwrap_or(f64::NEG_INFINITY);
+    let place = |name: &str| grid.places.iter().position(|p| p == name);
+    let mut runs: Vec<_> = grid.named().map(|(run, names)| (place(&names.place), mean(run), run, names)).collect();
+    // Stable: equal rates stay in the order of the matrix.
+    runs.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.partial_cmp(&a.1).unwrap_or(Ordering::Equal)));
+    for (_, _, run, names) in runs {
+        let mut row =
+            vec![Cell::Text(names.place.clone()), named(grid, names), Cell::Status(run.status), class_of(run)];
+        row.extend(metrics().map(|(name, _)| value_of(name, run)));
+        table.rows.push(row);
+    }
+    table.caption = "Scene by scene, the highest mean rate first. Brackets: 95 % bootstrap interval of the median over \
+                     trials; the other columns are medians over trials, and `cullmark query` gives their intervals. †: may \
+                     lose visible triangles by design; read its rates beside its false-cull pixels."
+        .into();
+    table
+}
