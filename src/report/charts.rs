@@ -131,10 +131,11 @@ fn time_per_frame(grid: &Grid) -> Figure {
     with_caption(
         figure,
         format!(
-            "Measured culling time per frame; {}. Each point is the mean of {}; line: median over repeats, band: smallest to largest.{}",
+            "Measured culling time per frame; {}. Each point is the mean of {}; line: median over repeats, band: smallest to largest.{}{}",
             basis(grid),
             count(every.into(), "frame", "frames"),
-            without_idle(grid)
+            without_idle(grid),
+            curves::words(grid)
         ),
     )
 }
@@ -155,9 +156,10 @@ fn triangles_per_frame(grid: &Grid) -> Figure {
     with_caption(
         figure,
         format!(
-            "Triangles submitted per frame; {}. Each point is the mean of {}. Counts must agree between repeats, or the run fails.",
+            "Triangles submitted per frame; {}. Each point is the mean of {}. Counts must agree between repeats, or the run fails.{}",
             basis(grid),
-            count(every.into(), "frame", "frames")
+            count(every.into(), "frame", "frames"),
+            curves::words(grid)
         ),
     )
 }

@@ -4,19 +4,19 @@
 use super::consolidate::consolidate;
 use super::facets::{self, BODY, HEAD, SMALL};
 use super::figure::{Figure, Part, Rect, plain};
-use super::findings::best;
+use super::findings::best_of;
 use super::font;
 use super::format::{self, count};
 use super::labels::Grid;
 use super::metrics::known;
+use super::rows::may_lose;
 use super::scale::Scale;
-use super::style::{INK, Look, MUTED};
+use super::style::{IDLE, INK, Look, MUTED};
 use crate::results::RunResult;
 use crate::stats;
 
 const TITLE: &str = "Triangles against culling time";
-const SUB: &str =
-    "The best sound combination of each scene, measured; every point a few frames, dashed their straight line.";
+const SUB: &str = "The best sound combination of each scene that culls, measured; a point is a few frames, dashed their straight line.";
 const LEFT: f64 = 74.0;
 
 /// What a panel shows.
@@ -55,14 +55,16 @@ pub fn draw(grid: &Grid) -> Option<Figure> {
     let every = count(grid.results.consolidate_frames.max(1).into(), "frame", "frames");
     figure.description = format!("{TITLE}. {all}.");
     figure.caption = format!(
-        "Each point is the mean of {every} (median over repeats); r and rank r are over all single frames, medians over \
+        "Of every scene the sound combination that culls with the shortest modelled frame. Each point is the mean of {every} \
+         (median over repeats); r and rank r (Spearman) are over all single frames, medians over \
          repeats. {all}."
     );
     Some(figure)
 }
 
 fn cloud<'a>(grid: &'a Grid, place: usize) -> Option<Cloud<'a>> {
-    let (c, run) = best(grid, place, true)?;
+    // Without culling the triangles never vary.
+    let (c, run) = best_of(grid, place, &|r| !may_lose(r) && r.culling != IDLE)?;
     let every = grid.results.consolidate_frames;
     if run.triangles.is_empty() || run.triangles.len() != run.cull_ns.len() {
         return None;

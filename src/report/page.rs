@@ -273,10 +273,17 @@ fn claims_html(content: &Content) -> String {
     out + &table(content, "claims")
 }
 
+/// Charts that are higher than some screens are folded: of hundreds of rows one looks up a few.
+const TALL: f64 = 2200.0;
+
 fn figures(content: &Content, ids: &[&str]) -> String {
     let mut out = String::new();
     for (figure, svg) in content.figures.iter().zip(content.svgs).filter(|(f, _)| ids.contains(&f.id.as_str())) {
         let id = &figure.id;
+        let tall = figure.height > TALL;
+        if tall {
+            let _ = writeln!(out, "<details class=\"tall\"><summary>{}</summary>", html(&figure.title));
+        }
         let _ = writeln!(
             out,
             "<figure id=\"{id}\">\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\">\n{svg}</div>\n\
@@ -285,6 +292,9 @@ fn figures(content: &Content, ids: &[&str]) -> String {
             html(&figure.title),
             html(&figure.caption),
         );
+        if tall {
+            out += "</details>\n";
+        }
     }
     out
 }

@@ -5,7 +5,8 @@
 use super::findings::best;
 use super::labels::Grid;
 use super::metrics::known;
-use super::table::{Cell, Column, Table, number};
+use super::rows::price;
+use super::table::{Cell, Column, Table, column, number};
 use super::tables::{cell, class_of, named, of};
 use crate::results::RunResult;
 use std::cmp::Ordering;
@@ -17,10 +18,10 @@ const RATES: [(&str, &str); 3] = [
     ("fps_mean_model", "mean, modelled"),
 ];
 const CORRELATIONS: [(&str, &str); 4] = [
-    ("pearson_triangles_cull", "r, culling"),
+    ("pearson_triangles_cull", "r, culling time"),
     ("spearman_triangles_cull", "rank r, culling"),
-    ("partial_triangles_cull", "r, culling, given nodes"),
-    ("pearson_triangles_frame_model", "r, frame modelled"),
+    ("partial_triangles_cull", "r given nodes"),
+    ("pearson_triangles_frame_model", "r, frame, modelled"),
 ];
 const LOST: (&str, &str) = ("false_cull_ppm", "false-cull pixels");
 
@@ -31,11 +32,14 @@ pub const WORDS: &str = "Frames per second are derived from the modelled frame, 
     Given nodes: with the nodes visited held constant, what is left of it. The modelled frame holds the triangles itself, so its r \
     is high by construction; that of culling time is measured. Where triangles do not vary there is none.";
 
+fn plain(name: &str, heading: &str) -> Column {
+    let metric = known(name);
+    column(heading, metric.unit, metric.about)
+}
+
 /// Only the mean carries its interval to the page: eight of them would bury the numbers.
 fn column_of(name: &str, heading: &str) -> Column {
-    let mut column = of(known(name), heading);
-    column.interval = name == "fps_mean_model";
-    column
+    if name == "fps_mean_model" { of(known(name), heading) } else { plain(name, heading) }
 }
 
 fn value_of(name: &str, run: &RunResult) -> Cell {
@@ -51,12 +55,12 @@ fn metrics() -> impl Iterator<Item = (&'static str, &'static str)> {
 pub fn best_table(grid: &Grid) -> Table {
     let mut columns = vec![
         Column::text("scene"),
-        column_of("scene_triangles", "triangles"),
+        column("triangles", "", known("scene_triangles").about),
         Column::text("best combination"),
         Column::text("walk"),
-        Column::text("class"),
     ];
-    columns.extend(metrics().map(|(name, heading)| column_of(name, heading)));
+    let metrics = || RATES.into_iter().chain(CORRELATIONS);
+    columns.extend(metrics().map(|(name, heading)| plain(name, heading)));
     let title = "Frames per second (modelled) of the best combination, scene by scene";
     let mut table = Table::new("rates-best", title, 1, columns);
     for (place, scene) in grid.places.iter().enumerate() {
@@ -67,17 +71,24 @@ pub fn best_table(grid: &Grid) -> Table {
             let mut row = vec![
                 Cell::Text(scene.clone()),
                 number(known("scene_triangles").value(run)),
-                Cell::Named(grid.combinations[c].clone(), grid.legend.entries[c].look),
+                // The price stands beside the name: a rate never goes without it.
+                Cell::Named(
+                    [Some(grid.combinations[c].clone()), price(run)]
+                        .into_iter()
+                        .flatten()
+                        .collect::<Vec<_>>()
+                        .join(" "),
+                    grid.legend.entries[c].look,
+                ),
                 Cell::Text(run.walk.clone()),
-                class_of(run),
             ];
-            row.extend(metrics().map(|(name, _)| value_of(name, run)));
+            row.extend(metrics().map(|(name, _)| number(known(name).value(run))));
             table.rows.push(row);
         }
     }
     table.caption = "The combination with the shortest modelled frame that must not lose visible triangles; below it, \
-                     where it models a shorter one still, the best that may (†). Brackets: 95 % bootstrap interval of the \
-                     median over trials."
+                     where it models a shorter one still, the best that may, with the pixels per million that lose theirs (†). \
+                     Medians over trials."
         .into();
     table
 }
@@ -99,9 +110,10 @@ pub fn all(grid: &Grid) -> Table {
         row.extend(metrics().map(|(name, _)| value_of(name, run)));
         table.rows.push(row);
     }
-    table.caption = "Scene by scene, the highest mean rate first. Brackets: 95 % bootstrap interval of the median over \
-                     trials; the other columns are medians over trials, and `cullmark query` gives their intervals. †: may \
+    table.caption =
+        "Scene by scene, the highest mean rate first. Brackets: 95 % bootstrap interval of the median over \
+                     trials; the other columns are medians over trials. †: may \
                      lose visible triangles by design; read its rates beside its false-cull pixels."
-        .into();
+            .into();
     table
 }

@@ -203,8 +203,8 @@ pub fn large() -> StudyResults {
     sized(&SCENES, 2000, 5)
 }
 
-/// 6 scenes x 16 structures x 8 cullings: 768 runs, as when a whole paper is done again.
-pub fn wide() -> StudyResults {
+/// 16 structures x 8 cullings a scene; of six 768 runs, as when a whole paper is done again.
+pub fn wide(scenes: &[(&str, f64)], frames: usize, trials: u32) -> StudyResults {
     let mut results = sized(&SCENES[..1], 30, 3);
     results.runs.clear();
     let depths = |kind: &str, key: &str, of: [u32; 5]| of.map(|d| format!("{kind}:{key}={d}"));
@@ -215,11 +215,11 @@ pub fn wide() -> StudyResults {
     let masks = ["octant_mask", "normal_mask", "octant_mask+normal_mask"];
     let cullings = ["none", "frustum"].map(String::from).into_iter().chain(masks.map(String::from));
     let cullings: Vec<String> = cullings.chain(masks.map(|m| format!("frustum+{m}"))).collect();
-    for (s, (scene, triangles)) in SCENES[..6].iter().enumerate() {
+    for (s, (scene, triangles)) in scenes.iter().enumerate() {
         for (i, structure) in structures.iter().enumerate() {
             for (j, culling) in cullings.iter().enumerate() {
                 let seed = (1000 * s + 10 * i + j) as u64;
-                results.runs.push(run(scene, *triangles, structure, culling, 400, 5, seed));
+                results.runs.push(run(scene, *triangles, structure, culling, frames, trials, seed));
             }
         }
     }
