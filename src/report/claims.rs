@@ -268,7 +268,8 @@ fn trend(scenes: &[(f64, Trials)]) -> Ratio {
     let value = correlate(&points).unwrap_or(f64::NAN);
     let mut rng = ChaCha8Rng::seed_from_u64(metrics::SEED);
     let found: Vec<f64> = (0..stats::RESAMPLES / 5)
-        .map(|_| {
+        // A resample of one scene alone has no correlation.
+        .filter_map(|_| {
             let sample: Vec<(f64, f64)> = scenes
                 .iter()
                 .map(|_| &scenes[((u64::from(rng.next_u32()) * scenes.len() as u64) >> 32) as usize])
@@ -278,8 +279,6 @@ fn trend(scenes: &[(f64, Trials)]) -> Ratio {
                 .collect();
             correlate(&sample)
         })
-        // A resample of one scene alone has no correlation.
-        .flatten()
         .collect();
     (value, stats::quantile(&found, 0.025), stats::quantile(&found, 0.975))
 }

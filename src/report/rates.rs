@@ -9,21 +9,17 @@ use super::rows::price;
 use super::table::{Cell, Column, Table, column, number};
 use super::tables::{cell, class_of, named, of};
 use crate::results::RunResult;
-use std::cmp::Ordering;
 
 /// Metrics with the headings of their columns.
-const RATES: [(&str, &str); 3] = [
+const METRICS: [(&str, &str); 7] = [
     ("fps_best_model", "best, modelled"),
     ("fps_worst_model", "worst, modelled"),
     ("fps_mean_model", "mean, modelled"),
-];
-const CORRELATIONS: [(&str, &str); 4] = [
     ("pearson_triangles_cull", "r, culling time"),
     ("spearman_triangles_cull", "rank r, culling"),
     ("partial_triangles_cull", "r given nodes"),
     ("pearson_triangles_frame_model", "r, frame, modelled"),
 ];
-const LOST: (&str, &str) = ("false_cull_ppm", "false-cull pixels");
 
 /// For the page, above the tables.
 pub const WORDS: &str = "Frames per second are derived from the modelled frame, culling plus drawing, and never measured: \
@@ -37,19 +33,6 @@ fn plain(name: &str, heading: &str) -> Column {
     column(heading, metric.unit, metric.about)
 }
 
-/// Only the mean carries its interval to the page: eight of them would bury the numbers.
-fn column_of(name: &str, heading: &str) -> Column {
-    if name == "fps_mean_model" { of(known(name), heading) } else { plain(name, heading) }
-}
-
-fn value_of(name: &str, run: &RunResult) -> Cell {
-    if name == "fps_mean_model" { cell(known(name), run) } else { number(known(name).value(run)) }
-}
-
-fn metrics() -> impl Iterator<Item = (&'static str, &'static str)> {
-    RATES.into_iter().chain(CORRELATIONS).chain([LOST])
-}
-
 /// By scene: the shortest modelled frame among sound methods and, where one that may lose
 /// triangles models a shorter one still, that.
 pub fn best_table(grid: &Grid) -> Table {
@@ -59,8 +42,7 @@ pub fn best_table(grid: &Grid) -> Table {
         Column::text("best combination"),
         Column::text("walk"),
     ];
-    let metrics = || RATES.into_iter().chain(CORRELATIONS);
-    columns.extend(metrics().map(|(name, heading)| plain(name, heading)));
+    columns.extend(METRICS.map(|(name, heading)| plain(name, heading)));
     let title = "Frames per second (modelled) of the best combination, scene by scene";
     let mut table = Table::new("rates-best", title, 1, columns);
     for (place, scene) in grid.places.iter().enumerate() {
@@ -82,7 +64,7 @@ pub fn best_table(grid: &Grid) -> Table {
                 ),
                 Cell::Text(run.walk.clone()),
             ];
-            row.extend(metrics().map(|(name, _)| number(known(name).value(run))));
+            row.extend(METRICS.map(|(name, _)| number(known(name).value(run))));
             table.rows.push(row);
         }
     }
@@ -93,27 +75,36 @@ pub fn best_table(grid: &Grid) -> Table {
     table
 }
 
+/// Only the mean carries its interval: seven of them would bury the numbers.
+fn with_interval(name: &str) -> bool {
+    name == "fps_mean_model"
+}
+
 /// Every run: scene by scene, by mean rate; what has no rate comes last.
 pub fn all(grid: &Grid) -> Table {
     let mut columns = vec![Column::text("scene"), Column::text("combination"), Column::text("status")];
-    columns.push(Column::text("class"));
-    columns.extend(metrics().map(|(name, heading)| column_of(name, heading)));
+    let column_of = |(name, heading)| if with_interval(name) { of(known(name), heading) } else { plain(name, heading) };
+    columns.extend(METRICS.map(column_of));
+    columns.extend([Column::text("class"), plain("false_cull_ppm", "false-cull pixels")]);
     let mut table = Table::new("rates", "Frames per second (modelled) and correlations of every run", 2, columns);
     let mean = |run: &RunResult| known("fps_mean_model").value(run).unwrap_or(f64::NEG_INFINITY);
     let place = |name: &str| grid.places.iter().position(|p| p == name);
     let mut runs: Vec<_> = grid.named().map(|(run, names)| (place(&names.place), mean(run), run, names)).collect();
     // Stable: equal rates stay in the order of the matrix.
-    runs.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.partial_cmp(&a.1).unwrap_or(Ordering::Equal)));
+    runs.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
     for (_, _, run, names) in runs {
-        let mut row =
-            vec![Cell::Text(names.place.clone()), named(grid, names), Cell::Status(run.status), class_of(run)];
-        row.extend(metrics().map(|(name, _)| value_of(name, run)));
+        let value = |name: &str| match with_interval(name) {
+            true => cell(known(name), run),
+            false => number(known(name).value(run)),
+        };
+        let mut row = vec![Cell::Text(names.place.clone()), named(grid, names), Cell::Status(run.status)];
+        row.extend(METRICS.map(|(name, _)| value(name)));
+        row.extend([class_of(run), number(known("false_cull_ppm").value(run))]);
         table.rows.push(row);
     }
-    table.caption =
-        "Scene by scene, the highest mean rate first. Brackets: 95 % bootstrap interval of the median over \
-                     trials; the other columns are medians over trials. †: may \
-                     lose visible triangles by design; read its rates beside its false-cull pixels."
-            .into();
+    table.caption = "Scene by scene, the highest mean rate first. Brackets: 95 % bootstrap interval of the median over \
+                     trials; the other columns are medians over trials. †: may lose visible triangles by design; read its \
+                     rates beside its false-cull pixels."
+        .into();
     table
 }

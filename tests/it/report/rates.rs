@@ -91,26 +91,26 @@ fn every_run_has_its_row_and_the_fastest_of_a_scene_comes_first() {
     let table = rates::all(&grid);
     assert_eq!(table.rows.len(), results.runs.len());
     let csv = table.csv();
-    assert!(csv.starts_with("scene,combination,status,class,\"best, modelled (fps)\""), "{csv}");
+    assert!(csv.starts_with("scene,combination,status,\"best, modelled (fps)\""), "{csv}");
     assert!(csv.contains("\"mean, modelled low (fps)\",\"mean, modelled high (fps)\""));
     for place in &grid.places {
         let rows: Vec<&Vec<Cell>> = table.rows.iter().filter(|r| r[0] == Cell::Text(place.clone())).collect();
         let means: Vec<Option<f64>> =
-            rows.iter().map(|r| if let Cell::Interval(v, ..) = r[6] { Some(v) } else { None }).collect();
+            rows.iter().map(|r| if let Cell::Interval(v, ..) = r[5] { Some(v) } else { None }).collect();
         assert!(means.is_sorted_by(|a, b| a.unwrap_or(-1.0) >= b.unwrap_or(-1.0)), "{means:?}");
         assert!(rows.iter().zip(&means).all(|(r, m)| (r[2] == Cell::Status(RunStatus::Done)) == m.is_some()));
     }
     // Whoever culls nothing submits the same triangles all the time.
     let idle = table.rows.iter().find(|r| r[1].show() == "octree:depth=4 × none").unwrap();
-    assert_eq!(texts(&table, idle)[7..11], ["–", "–", "–", "–"]);
+    assert_eq!(texts(&table, idle)[6..10], ["–", "–", "–", "–"]);
 
     let best = rates::best_table(&grid);
     for (row, place) in best.rows.iter().filter(|r| !r[4].show().starts_with('†')).zip(&grid.places) {
         assert_eq!(row[0], Cell::Text(place.clone()));
-        let of_place = |r: &&Vec<Cell>| r[0] == row[0] && !r[3].show().starts_with('†');
+        let of_place = |r: &&Vec<Cell>| r[0] == row[0] && !r[10].show().starts_with('†');
         let first = table.rows.iter().find(of_place).unwrap();
         assert_eq!(
-            (first[1].show(), first[5].show()),
+            (first[1].show(), first[4].show()),
             (row[2].show(), row[5].show()),
             "the first sound row of {place}"
         );
@@ -131,9 +131,9 @@ fn the_chart_shows_the_frames_of_the_best_of_every_scene_with_its_r() {
     let table = rates::all(&grid);
     for place in &grid.places {
         let fits =
-            |r: &&Vec<Cell>| r[0].show() == *place && !r[3].show().starts_with('†') && !r[1].show().ends_with("none");
+            |r: &&Vec<Cell>| r[0].show() == *place && !r[10].show().starts_with('†') && !r[1].show().ends_with("none");
         let row = table.rows.iter().find(fits).unwrap();
-        let words = format!("r = {}, rank r = {}", row[7].show(), row[8].show());
+        let words = format!("r = {}, rank r = {}", row[6].show(), row[7].show());
         assert!(texts.contains(place) && texts.contains(&row[1].show()) && texts.contains(&words), "{words}");
         assert!(figure.caption.contains(&words), "{}", figure.caption);
     }
