@@ -1,6 +1,10 @@
 //! Published statements as data, and selections of runs: what the manifest
 //! writes and the report judges. Plain types, no I/O.
 
+mod metrics;
+
+pub use metrics::{Better, METRICS, Metric};
+
 use crate::error::{Error, Result};
 use crate::math::Arithmetic;
 use crate::record::{RunSpec, cameras};
@@ -62,6 +66,11 @@ pub enum Relation {
     /// published range, widened by the tolerance.
     #[serde(rename = "value")]
     Value,
+    /// Of all runs that the denominator selects in a group, one that the numerator selects
+    /// too has the best value: least, or greatest where more is better. The ratio is that of
+    /// the two best, of the numerator and of the rest, so turned that below 1 is better.
+    #[serde(rename = "best")]
+    Best,
 }
 
 impl Relation {
@@ -73,6 +82,7 @@ impl Relation {
         ("grows", Relation::Grows),
         ("zero", Relation::Zero),
         ("value", Relation::Value),
+        ("best", Relation::Best),
     ];
 
     /// About the metric of the numerator alone, not about a ratio.
@@ -91,52 +101,6 @@ impl Claim {
         self.published_for.get(group).copied().or(self.published)
     }
 }
-
-/// A number a claim can be about.
-#[derive(Debug)]
-pub struct Metric {
-    pub name: &'static str,
-    pub unit: &'static str,
-    /// Derived by a model rather than measured: at best "reproduced in the model only".
-    pub modelled: bool,
-    /// Comes from a clock or from memory (has an interval) rather than counted.
-    pub measured: bool,
-    pub about: &'static str,
-}
-
-const fn metric(name: &'static str, unit: &'static str, kind: u8, about: &'static str) -> Metric {
-    Metric { name, unit, modelled: kind == 2, measured: kind != 0, about }
-}
-
-/// Sorted by name. Kind 0: counted, 1: measured, 2: modelled.
-pub static METRICS: &[Metric] = &[
-    metric("build_ms", "ms", 1, "building the structure, flattening included"),
-    metric("cull_ms", "ms", 1, "culling time a frame, mean over the path"),
-    metric("duplicates", "entries", 0, "entries beyond the first of each triangle, summed over judged frames"),
-    metric("fallbacks_exact_share", "", 0, "signs that needed exact arithmetic, of all asked"),
-    metric("fallbacks_f64_share", "", 0, "signs that single precision could not tell, of all asked"),
-    metric("false_cull_ppm", "px/M", 0, "pixels whose triangle was not submitted, per million pixels"),
-    metric("false_cull_sample_ppm", "smp/M", 0, "samples whose triangle was not submitted, per million samples"),
-    metric("false_cull_share", "", 0, "visible triangles not submitted, of all visible ones"),
-    metric("false_culls", "triangles", 0, "visible triangles not submitted, summed over judged frames"),
-    metric("false_culls_by_ray", "triangles", 0, "of the false culls those that no sample sees"),
-    metric("frame_ms_model", "ms", 2, "modelled time a frame: culling + indices + draw calls, mean over the path"),
-    metric("largest_blob_px", "px", 0, "largest connected hole in any judged frame"),
-    metric("mean_draw_calls", "calls", 0, "draw calls a frame"),
-    metric("mean_nodes_visited", "nodes", 0, "nodes judged a frame"),
-    metric("mean_triangles", "triangles", 0, "triangles submitted a frame"),
-    metric("over_submission", "", 0, "submitted over visible triangles, mean over judged frames"),
-    metric("over_submission_hi", "", 0, "share of what was submitted that is not known to be visible"),
-    metric("over_submission_lo", "", 0, "share of what was submitted that is proved invisible"),
-    metric("p99_cull_ms", "ms", 1, "99th percentile of culling time a frame"),
-    metric("peak_rss_mib", "MiB", 1, "peak resident memory of the trial, the scene included"),
-    metric("potential_lost", "triangles", 0, "members of the exact set lost, seen or hidden"),
-    metric("potential_lost_share", "", 0, "members of the exact set lost, of all its members"),
-    metric("prepare_ms", "ms", 1, "building the per-node columns of the tests"),
-    metric("structure_mib", "MiB", 0, "bytes of the structure and of the tests' columns"),
-    metric("total_cull_ms", "ms", 1, "culling time summed over the path"),
-    metric("total_frame_ms_model", "ms", 2, "modelled time summed over the path"),
-];
 
 /// Axis name to selectors, any of which may match; axes not named are free.
 pub type Selection = BTreeMap<String, Vec<String>>;

@@ -157,21 +157,69 @@ pub fn ratio_ci(a: &[f64], b: &[f64], resamples: usize, seed: u64) -> (f64, f64,
     (ratio, quantile_sorted(&v, 0.025), quantile_sorted(&v, 0.975))
 }
 
-/// Pearson correlation; NaN when either side does not vary.
-pub fn pearson(x: &[f64], y: &[f64]) -> f64 {
-    let (mx, my) = (mean(x), mean(y));
-    let (mut xy, mut xx, mut yy) = (0.0, 0.0, 0.0);
-    for (a, b) in x.iter().zip(y) {
-        xy += (a - mx) * (b - my);
-        xx += (a - mx).powi(2);
-        yy += (b - my).powi(2);
+/// Least number of values that a correlation is of: through two points there is always a line.
+const FEWEST: usize = 3;
+
+/// Deviations from the mean; none where the values do not vary, are too few or not all finite.
+fn centred(values: &[f64]) -> Option<Vec<f64>> {
+    let first = *values.first()?;
+    let varies = values.iter().any(|v| *v != first);
+    if values.len() < FEWEST || !varies || values.iter().any(|v| !v.is_finite()) {
+        return None;
     }
-    xy / (xx * yy).sqrt()
+    let m = mean(values);
+    Some(values.iter().map(|v| v - m).collect())
 }
 
-/// Spearman rank correlation, ties given their mean rank.
-pub fn spearman(x: &[f64], y: &[f64]) -> f64 {
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Cosine of two deviations: their correlation.
+fn cosine(a: &[f64], b: &[f64]) -> Option<f64> {
+    let r = dot(a, b) / (dot(a, a).sqrt() * dot(b, b).sqrt());
+    // Rounding may go a last digit beyond 1.
+    r.is_finite().then(|| r.clamp(-1.0, 1.0))
+}
+
+/// Pearson correlation. None when either side does not vary, for fewer than three values,
+/// for values that are not finite and for sides of different lengths.
+pub fn pearson(x: &[f64], y: &[f64]) -> Option<f64> {
+    if x.len() != y.len() {
+        return None;
+    }
+    cosine(&centred(x)?, &centred(y)?)
+}
+
+/// Spearman rank correlation, ties given their mean rank; none where [`pearson`] has none.
+pub fn spearman(x: &[f64], y: &[f64]) -> Option<f64> {
+    if x.iter().chain(y).any(|v| !v.is_finite()) {
+        return None;
+    }
     pearson(&ranks(x), &ranks(y))
+}
+
+/// What is less than this share of a side's variance is rounding and not left to correlate.
+const NOTHING_LEFT: f64 = 1e-10;
+
+/// Partial correlation of `x` and `y` with `z` held constant: the correlation of what a
+/// straight line in `z` leaves of either. None where it leaves nothing of one of them, where
+/// `x` or `y` does not vary, and for fewer than four values. A constant `z` holds nothing back.
+pub fn partial(x: &[f64], y: &[f64], z: &[f64]) -> Option<f64> {
+    if x.len() != y.len() || x.len() != z.len() || x.len() <= FEWEST {
+        return None;
+    }
+    if z.iter().all(|v| *v == z[0]) {
+        return pearson(x, y);
+    }
+    let z = centred(z)?;
+    let rest = |side: &[f64]| {
+        let side = centred(side)?;
+        let slope = dot(&side, &z) / dot(&z, &z);
+        let rest: Vec<f64> = side.iter().zip(&z).map(|(s, z)| s - slope * z).collect();
+        (dot(&rest, &rest) > NOTHING_LEFT * dot(&side, &side)).then_some(rest)
+    };
+    cosine(&rest(x)?, &rest(y)?)
 }
 
 fn ranks(values: &[f64]) -> Vec<f64> {
@@ -263,12 +311,67 @@ mod tests {
         assert!(r == 2.0 && lo > 1.5);
     }
 
+    fn near(found: Option<f64>, by_hand: f64) {
+        assert!(found.is_some_and(|r| (r - by_hand).abs() < 1e-12), "{found:?} is not {by_hand}");
+    }
+
     #[test]
     fn correlations_of_a_monotone_curve() {
         let x: Vec<f64> = (0..50).map(f64::from).collect();
         let y: Vec<f64> = x.iter().map(|v| v * v * v).collect();
-        assert!((spearman(&x, &y) - 1.0).abs() < 1e-12);
-        assert!(pearson(&x, &y) < 0.95);
+        near(spearman(&x, &y), 1.0);
+        assert!(pearson(&x, &y).unwrap() < 0.95);
         assert_eq!(ranks(&[5.0, 5.0, 1.0]), [1.5, 1.5, 0.0]);
+    }
+
+    #[test]
+    fn correlations_are_those_found_by_hand() {
+        let (x, y) = ([1.0, 2.0, 3.0, 4.0, 5.0], [2.0, 1.0, 4.0, 3.0, 5.0]);
+        // Deviations -2 -1 0 1 2 and -1 -2 1 0 2: products 8, squares 10 and 10.
+        near(pearson(&x, &y), 0.8);
+        near(spearman(&x, &y), 0.8);
+        near(pearson(&x, &[-1.0, -3.0, -5.0, -7.0, -9.0]), -1.0);
+        // Deviations -2 0 2 and -3 1 2: products 10, squares 8 and 14.
+        near(pearson(&[1.0, 3.0, 5.0], &[0.0, 4.0, 5.0]), 10.0 / 112f64.sqrt());
+        // Ties: ranks 0 1.5 1.5 3 and 0 1 2 3; products 4.5, squares 4.5 and 5.
+        near(spearman(&[10.0, 20.0, 20.0, 90.0], &[1.0, 2.0, 3.0, 4.0]), 4.5 / 22.5f64.sqrt());
+        // All tied on one side but one: ranks 1 1 1 3 about 1.5.
+        near(spearman(&[7.0, 7.0, 7.0, 9.0], &[1.0, 2.0, 3.0, 4.0]), 3.0 / 15f64.sqrt());
+        // A far offset must not eat the digits.
+        let far = |v: [f64; 5]| v.map(|v| v + 1e9);
+        near(pearson(&far(x), &far(y)), 0.8);
+    }
+
+    #[test]
+    fn a_partial_correlation_is_that_of_the_residuals() {
+        let (x, y) = ([1.0, 2.0, 3.0, 4.0, 5.0], [2.0, 1.0, 4.0, 3.0, 5.0]);
+        let z = [1.0, 3.0, 2.0, 5.0, 4.0];
+        // r_xy = 0.8, r_xz = 0.8, r_yz = 0.5: (0.8 - 0.8 x 0.5) / sqrt(0.36 x 0.75).
+        near(pearson(&x, &z), 0.8);
+        near(pearson(&y, &z), 0.5);
+        near(partial(&x, &y, &z), 0.4 / 0.27f64.sqrt());
+        near(partial(&y, &x, &z), 0.4 / 0.27f64.sqrt());
+        // Triangles and time that both follow the nodes, and differ from them in opposite ways.
+        let nodes = [1.0, 2.0, 3.0, 4.0];
+        let (more, less) = ([1.1, 1.9, 2.9, 4.1], [0.9, 2.1, 3.1, 3.9]);
+        assert!(pearson(&more, &less).unwrap() > 0.9);
+        near(partial(&more, &less, &nodes), -1.0);
+        near(partial(&x, &y, &[6.0; 5]), 0.8);
+        assert_eq!(partial(&x, &y, &x.map(|v| 3.0 * v + 0.1)), None, "nothing is left of x");
+        assert_eq!(partial(&nodes[..3], &more[..3], &less[..3]), None, "three points leave one degree of freedom");
+    }
+
+    #[test]
+    fn where_a_series_does_not_vary_there_is_no_correlation() {
+        let y = [1.0, 2.0, 3.0, 4.0];
+        // A mean of tenths is none of them: deviations of rounding alone must not correlate.
+        for x in [[0.1; 4], [0.0; 4], [f64::NAN, 1.0, 2.0, 3.0], [f64::INFINITY, 1.0, 2.0, 3.0]] {
+            assert_eq!((pearson(&x, &y), pearson(&y, &x)), (None, None), "{x:?}");
+            assert_eq!((spearman(&x, &y), spearman(&y, &x)), (None, None), "{x:?}");
+            assert_eq!(partial(&x, &y, &[1.0, 3.0, 2.0, 5.0]), None, "{x:?}");
+        }
+        assert_eq!(pearson(&y, &y[..3]), None);
+        assert_eq!(pearson(&[1.0, 2.0], &[5.0, 3.0]), None, "two points lie on a line whatever they are");
+        assert_eq!((pearson(&[], &[]), spearman(&[], &[]), partial(&[], &[], &[])), (None, None, None));
     }
 }

@@ -8,12 +8,12 @@ use super::input::{Path, Query};
 use super::problem::{Answer, Problem};
 use super::state::Shared;
 use crate::claim::Claim;
+use crate::report::claims;
 use crate::report::filter::Filter;
-use crate::report::frontier::{Standing, fronts};
+use crate::report::frontier::{Standing, coordinate, fronts};
 use crate::report::frontier_table::{X, Y, only};
 use crate::report::labels::Grid;
 use crate::report::select::mask;
-use crate::report::{claims, metrics};
 use crate::results::StudyResults;
 use crate::store::Detail;
 use axum::extract::{OriginalUri, State};
@@ -129,8 +129,8 @@ pub async fn front(
     OriginalUri(uri): OriginalUri,
     headers: HeaderMap,
 ) -> Answer<Response> {
-    let x = metrics::get(q.x.as_deref().unwrap_or(X)).map_err(|e| e.key("x"))?;
-    let y = metrics::get(q.y.as_deref().unwrap_or(Y)).map_err(|e| e.key("y"))?;
+    let x = coordinate(q.x.as_deref().unwrap_or(X)).map_err(|e| e.key("x"))?;
+    let y = coordinate(q.y.as_deref().unwrap_or(Y)).map_err(|e| e.key("y"))?;
     let (results, version) = results(&app, &study, q.filter.as_deref()).await?;
     let tag = caching::tag(&version, &uri.to_string());
     if caching::fresh(&headers, &tag) {

@@ -1,5 +1,6 @@
 //! Shapes that several answers share.
 
+use crate::claim::Better;
 use crate::report::metrics::{Kind, Metric};
 use crate::report::table::Cell;
 use crate::store::Overview;
@@ -72,6 +73,8 @@ pub struct MetricInfo {
     pub unit: String,
     /// `measured`, `modelled`, `counted` or `judged`
     pub kind: String,
+    /// Which of two values is the better one: `less`, `more` or `neither`
+    pub better: String,
     pub about: String,
 }
 
@@ -83,7 +86,18 @@ impl From<&Metric> for MetricInfo {
             Kind::Counted => "counted",
             Kind::Judged => "judged",
         };
-        MetricInfo { name: m.name.into(), unit: m.unit.into(), kind: kind.into(), about: m.about.into() }
+        let better = match m.better {
+            Better::Less => "less",
+            Better::More => "more",
+            Better::Neither => "neither",
+        };
+        MetricInfo {
+            name: m.name.into(),
+            unit: m.unit.into(),
+            kind: kind.into(),
+            better: better.into(),
+            about: m.about.into(),
+        }
     }
 }
 

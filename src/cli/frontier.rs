@@ -3,10 +3,9 @@
 use super::report::{named, put};
 use crate::report::fields::Fields;
 use crate::report::filter::Filter;
-use crate::report::frontier::fronts;
+use crate::report::frontier::{coordinate, fronts};
 use crate::report::frontier_table::{X, Y, only, table, text};
 use crate::report::labels::Grid;
-use crate::report::metrics;
 use crate::report::query::{Format, print};
 use crate::store::{self, Detail};
 use std::path::PathBuf;
@@ -45,8 +44,8 @@ pub struct Args {
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (study, _) = named(&args.study)?;
-    let x = metrics::get(&args.x).map_err(|e| e.key("--x"))?;
-    let y = metrics::get(&args.y).map_err(|e| e.key("--y"))?;
+    let x = coordinate(&args.x).map_err(|e| e.key("--x"))?;
+    let y = coordinate(&args.y).map_err(|e| e.key("--y"))?;
     let results = store::read_results(&args.db, &study, Detail::Frames)?;
     let fields = Fields::of(&results);
     let filter = args.filter.as_deref().map(|f| Filter::parse(f, &fields)).transpose()?;

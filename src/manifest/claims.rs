@@ -6,7 +6,7 @@ use super::rules::Rule;
 use super::scenes::{Names, unknown_name};
 use super::selections;
 use super::tree::{Data, Node};
-use crate::claim::{Claim, METRICS, Relation, Selection};
+use crate::claim::{Better, Claim, METRICS, Relation, Selection};
 use crate::error::{Error, did_you_mean};
 use std::collections::BTreeMap;
 
@@ -40,7 +40,7 @@ fn claim(mut f: Fields, id: Option<String>, names: &Names) -> Option<Claim> {
     if !f.has("relation") {
         f.missing(
             "relation",
-            "what is stated of numerator / denominator: \"<\", \">\", \"ratio\" or \"grows\"; of the numerator alone: \"zero\" or \"value\"",
+            "what is stated of numerator / denominator: \"<\", \">\", \"ratio\", \"grows\" or \"best\"; of the numerator alone: \"zero\" or \"value\"",
         );
     }
     let relation = f.choice("relation", Relation::ALL);
@@ -76,6 +76,13 @@ fn claim(mut f: Fields, id: Option<String>, names: &Names) -> Option<Claim> {
         let e = Error::new("\"grows\" compares scenes by their triangle count");
         f.note(&node.place, "relation", e.help("add for_each = \"scene\""));
     }
+    if relation == Some(Relation::Best)
+        && let Some(name) = metric.as_deref().filter(|name| ranks_nothing(name))
+        && let Some(node) = f.get("relation")
+    {
+        let e = Error::new(format!("no value of `{name}` is better than another, so none is best"));
+        f.note(&node.place, "relation", e.help("name a metric that ranks, such as frame_ms_model or fps_mean_model"));
+    }
     f.finish();
     Some(Claim {
         id: id?,
@@ -90,6 +97,10 @@ fn claim(mut f: Fields, id: Option<String>, names: &Names) -> Option<Claim> {
         tolerance: tolerance.unwrap_or(0.25),
         for_each,
     })
+}
+
+fn ranks_nothing(name: &str) -> bool {
+    METRICS.iter().any(|m| m.name == name && m.better == Better::Neither)
 }
 
 /// A name of [`METRICS`] under the key `name`.
@@ -134,8 +145,10 @@ type Published = (Option<[f64; 2]>, BTreeMap<String, [f64; 2]>);
 
 /// `3.35`, `[1.71, 1.79]`, or a table of either by group.
 fn published(f: &mut Fields, relation: Option<Relation>, for_each: Option<&str>, names: &Names) -> Published {
-    // A ratio of 0 says nothing; a share may well be 0.
-    let least = if relation == Some(Relation::Value) { 0.0 } else { f64::from_bits(1) };
+    // A ratio of 0 says nothing; a share may well be 0, and a correlation below it.
+    let own = relation == Some(Relation::Value);
+    let least = if own { f64::NEG_INFINITY } else { f64::from_bits(1) };
+    let not_a_ratio = || not_a_ratio(own);
     let mut by_group = BTreeMap::new();
     let Some(node) = f.get("published") else { return (None, by_group) };
     let Data::Table(table) = &node.data else {
@@ -171,9 +184,13 @@ fn published(f: &mut Fields, relation: Option<Relation>, for_each: Option<&str>,
     (None, by_group)
 }
 
-fn not_a_ratio() -> Error {
-    Error::new("must be a ratio above 0, or a low and a high one")
-        .help("write published = 3.35, published = [1.71, 1.79] or published = { nucleus = 3.5 }")
+fn not_a_ratio(own: bool) -> Error {
+    let what = if own {
+        "must be a number, or a low and a high one"
+    } else {
+        "must be a ratio above 0, or a low and a high one"
+    };
+    Error::new(what).help("write published = 3.35, published = [1.71, 1.79] or published = { nucleus = 3.5 }")
 }
 
 fn ratio(node: &Node, least: f64) -> Option<[f64; 2]> {
@@ -187,5 +204,6 @@ fn ratio(node: &Node, least: f64) -> Option<[f64; 2]> {
         Some([low, high]) => [number(low)?, number(high)?],
         Some(_) => return None,
     };
-    (range[0] >= least && range[0] <= range[1] && range[1].is_finite()).then_some(range)
+    let finite = range.iter().all(|x| x.is_finite());
+    (finite && range[0] >= least && range[0] <= range[1]).then_some(range)
 }

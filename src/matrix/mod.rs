@@ -6,7 +6,7 @@ mod labels;
 pub mod plan;
 mod sweeps;
 
-use crate::claim::selects;
+use crate::claim::{Claim, Relation, selects};
 use crate::culling::knows_arithmetic;
 use crate::error::Error;
 use crate::manifest::Manifest;
@@ -18,7 +18,7 @@ use crate::registry::Spec;
 use crate::results::Excluded;
 use cells::{Block, Cell, Compiled, Pool};
 pub use labels::{Labels, labels};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What the machine and the caller add to every run.
 #[derive(Debug, Clone, PartialEq)]
@@ -275,6 +275,12 @@ fn check_claims(manifest: &Manifest, runs: &[RunSpec], mistakes: &Mistakes) {
         if empty {
             continue;
         }
+        if claim.relation == Relation::Best
+            && let Some((key, e)) = best_of_nothing(claim, &under)
+        {
+            mistakes.note(&rule.place, &format!("{}{key}", rule.key), e);
+            continue;
+        }
         let Some(axis) = claim.for_each.as_deref() else { continue };
         let group = |r: &RunSpec| labels(r).of(axis);
         let groups: Vec<String> = over.iter().map(|r| group(r)).collect();
@@ -288,6 +294,31 @@ fn check_claims(manifest: &Manifest, runs: &[RunSpec], mistakes: &Mistakes) {
             mistakes.note(&rule.place, &key, e.help(format!("{axis}s of the claim: {}", distinct(&groups).join(", "))));
         }
     }
+}
+
+/// Who is to be the best of many must be one of them, not all, and all of one scene and path.
+fn best_of_nothing(claim: &Claim, among: &[&RunSpec]) -> Option<(&'static str, Error)> {
+    let named = among.iter().filter(|r| selects(&claim.numerator, r)).count();
+    if named == 0 {
+        let e = Error::new("selects no run that the denominator selects");
+        return Some((
+            ".numerator",
+            e.help("the denominator selects all that compete, the numerator who of them is best"),
+        ));
+    }
+    if named == among.len() {
+        let e = Error::new("selects no run beside those of the numerator");
+        return Some((".denominator", e.help("widen it to all that compete, such as { structure = \"octree\" }")));
+    }
+    let group = |r: &RunSpec| claim.for_each.as_deref().map(|axis| labels(r).of(axis));
+    let places: BTreeSet<_> = among.iter().map(|r| (group(r), &r.scene.name, &r.path.name)).collect();
+    let groups: BTreeSet<_> = among.iter().map(|r| group(r)).collect();
+    // For each scene stands for each of its paths.
+    let several = places.len() > groups.len() && claim.for_each.as_deref() != Some("scene");
+    several.then(|| {
+        let e = Error::new("\"best\" compares runs of one scene and path, and a group holds several");
+        (".relation", e.help("add for_each = \"scene\", or name the scene and path in both selections"))
+    })
 }
 
 fn distinct(names: &[String]) -> Vec<&str> {

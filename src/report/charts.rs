@@ -1,6 +1,7 @@
 //! The charts of a report, in the order of the page.
 
 use super::claims::Judged;
+use super::correlation;
 use super::curves::{self, Curves};
 use super::figure::Figure;
 use super::forest;
@@ -17,6 +18,7 @@ pub fn all(grid: &Grid, judged: &[Judged]) -> Vec<Figure> {
         return Vec::new();
     }
     let mut figures = vec![total_model(grid), total_time(grid), time_per_frame(grid), triangles_per_frame(grid)];
+    figures.extend(correlation::draw(grid));
     if grid.runs().any(|r| !r.errors.is_empty()) {
         figures.extend(errors(grid));
     }
@@ -129,10 +131,11 @@ fn time_per_frame(grid: &Grid) -> Figure {
     with_caption(
         figure,
         format!(
-            "Measured culling time per frame; {}. Each point is the mean of {}; line: median over repeats, band: smallest to largest.{}",
+            "Measured culling time per frame; {}. Each point is the mean of {}; line: median over repeats, band: smallest to largest.{}{}",
             basis(grid),
             count(every.into(), "frame", "frames"),
-            without_idle(grid)
+            without_idle(grid),
+            curves::words(grid)
         ),
     )
 }
@@ -153,9 +156,10 @@ fn triangles_per_frame(grid: &Grid) -> Figure {
     with_caption(
         figure,
         format!(
-            "Triangles submitted per frame; {}. Each point is the mean of {}. Counts must agree between repeats, or the run fails.",
+            "Triangles submitted per frame; {}. Each point is the mean of {}. Counts must agree between repeats, or the run fails.{}",
             basis(grid),
-            count(every.into(), "frame", "frames")
+            count(every.into(), "frame", "frames"),
+            curves::words(grid)
         ),
     )
 }

@@ -1,5 +1,6 @@
 //! Verdicts on published claims: four outcomes, place by place.
 
+use super::best;
 use super::metrics::{self, Kind, Metric};
 use super::own_value;
 use super::pairs::{Pairs, Trials, groups, trials};
@@ -67,6 +68,8 @@ pub fn judge<'a>(results: &StudyResults, claim: &'a Claim) -> Judged<'a> {
     let (measured, modelled) = twins(&claim.metric);
     let mut out: Vec<Group> = if claim.relation.is_own() {
         own_value::groups(results, claim)
+    } else if claim.relation == Relation::Best {
+        best::groups(results, claim, measured, modelled)
     } else if claim.relation == Relation::Grows {
         grows(claim, &groups(results, claim), measured, modelled)
     } else {
@@ -125,12 +128,13 @@ fn resample(from: &[f64], rng: &mut ChaCha8Rng) -> f64 {
 /// elsewhere, or on both sides.
 pub fn decide(relation: Relation, published: Option<[f64; 2]>, tolerance: f64, (value, low, high): Ratio) -> Verdict {
     let (from, to) = match relation {
-        Relation::Less => (f64::NEG_INFINITY, 1.0),
+        Relation::Less | Relation::Best => (f64::NEG_INFINITY, 1.0),
         Relation::Greater => (1.0, f64::INFINITY),
         Relation::Grows => (0.0, f64::INFINITY),
         Relation::Zero => (0.0, 0.0),
         Relation::Ratio | Relation::Value => match published {
-            Some([a, b]) => (a * (1.0 - tolerance), b * (1.0 + tolerance)),
+            // A correlation may be below 0, and is widened all the same.
+            Some([a, b]) => (a - tolerance * a.abs(), b + tolerance * b.abs()),
             None => return Verdict::Undecided,
         },
     };
@@ -142,6 +146,9 @@ pub fn decide(relation: Relation, published: Option<[f64; 2]>, tolerance: f64, (
     let inside = |x: f64| if closed { from <= x && x <= to } else { from < x && x < to };
     if inside(low) && inside(high) {
         Verdict::Reproduced
+    } else if relation == Relation::Best && low <= to {
+        // Level with the best of the rest is neither better nor worse.
+        Verdict::Undecided
     } else if high < from || low > to || (!closed && (high <= from || low >= to)) {
         Verdict::Contradicted
     } else {
@@ -204,6 +211,8 @@ pub(super) fn stated(claim: &Claim, published: Option<[f64; 2]>) -> String {
         (Relation::Less, Some(r)) => format!("below 1 (published {r})"),
         (Relation::Greater, None) => "above 1".into(),
         (Relation::Greater, Some(r)) => format!("above 1 (published {r})"),
+        (Relation::Best, None) => "best: below 1".into(),
+        (Relation::Best, Some(r)) => format!("best: below 1 (published {r})"),
         (Relation::Zero, _) => format!("{} is 0", claim.metric),
         (Relation::Ratio | Relation::Value, r) => {
             format!("{} ± {} %", r.unwrap_or_default(), number(100.0 * claim.tolerance))
@@ -256,10 +265,11 @@ fn trend(scenes: &[(f64, Trials)]) -> Ratio {
             &points.iter().map(|p| p.1).collect::<Vec<_>>(),
         )
     };
-    let value = correlate(&points);
+    let value = correlate(&points).unwrap_or(f64::NAN);
     let mut rng = ChaCha8Rng::seed_from_u64(metrics::SEED);
     let found: Vec<f64> = (0..stats::RESAMPLES / 5)
-        .map(|_| {
+        // A resample of one scene alone has no correlation.
+        .filter_map(|_| {
             let sample: Vec<(f64, f64)> = scenes
                 .iter()
                 .map(|_| &scenes[((u64::from(rng.next_u32()) * scenes.len() as u64) >> 32) as usize])
@@ -269,8 +279,6 @@ fn trend(scenes: &[(f64, Trials)]) -> Ratio {
                 .collect();
             correlate(&sample)
         })
-        // A resample of one scene alone has no correlation.
-        .filter(|c| !c.is_nan())
         .collect();
     (value, stats::quantile(&found, 0.025), stats::quantile(&found, 0.975))
 }

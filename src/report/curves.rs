@@ -5,13 +5,15 @@
 use super::consolidate::{BandPoint, band};
 use super::facets::{self, BODY, HEAD, SMALL, Sample};
 use super::figure::{Figure, Mark, Part, Rect, plain, text_box};
+use super::findings::done;
 use super::font;
 use super::labels::Grid;
-use super::metrics::frames;
+use super::metrics::{frames, known};
 use super::rows::absence;
 use super::scale::Scale;
-use super::style::{IDLE, INK, MUTED};
+use super::style::{IDLE, INK, Legend, Look, MUTED};
 use crate::results::{RunResult, RunStatus};
+use std::collections::BTreeSet;
 
 pub struct Curves<'a> {
     pub id: &'a str,
@@ -25,6 +27,9 @@ pub struct Curves<'a> {
     pub series: &'a dyn Fn(&RunResult) -> Vec<Vec<f64>>,
 }
 
+/// With more lines than this a panel shows [`FEW`] alone.
+const MOST_LINES: usize = 16;
+const FEW: usize = 6;
 /// More columns than this are too narrow to read.
 const MOST_COLUMNS: usize = 5;
 /// Of the whole figure.
@@ -32,6 +37,15 @@ const WIDTH: f64 = 1040.0;
 const LEFT: f64 = 74.0;
 
 type Line = Vec<BandPoint>;
+
+/// Which combinations are drawn, and how they look.
+struct Chosen {
+    legend: Legend,
+    /// By combination.
+    looks: Vec<Look>,
+    /// By place, where not all are.
+    few: Option<Vec<Vec<usize>>>,
+}
 
 /// One set of axes: a scene, and the combinations it shows.
 struct Panel {
@@ -57,12 +71,19 @@ pub fn draw(grid: &Grid, what: &Curves) -> Figure {
     let drawn = |r: &&RunResult| r.status == RunStatus::Done && !(what.working_only && r.culling == IDLE);
     let line =
         |cell: &Option<&RunResult>| cell.filter(drawn).map(what.series).map_or_else(Vec::new, |t| band(&t, every));
-    let curves: Vec<Vec<Line>> = grid.cells.iter().map(|row| row.iter().map(line).collect()).collect();
+    let chosen = choose(grid);
+    let shows = |place: usize, c: &usize| chosen.few.as_ref().is_none_or(|few| few[place].contains(c));
+    let curves: Vec<Vec<Line>> = (0..grid.places.len())
+        .map(|p| {
+            let cells = grid.cells[p].iter().enumerate();
+            cells.map(|(c, cell)| if shows(p, &c) { line(cell) } else { Line::new() }).collect()
+        })
+        .collect();
 
-    let layout = layout(grid);
+    let layout = layout(grid, &chosen);
     let mut figure = Figure::new(what.id, what.title, WIDTH, layout.height);
     facets::title(&mut figure, what.title, what.sub);
-    facets::legend(&mut figure, &grid.legend, 16.0, 58.0, WIDTH - 32.0, layout.legend);
+    facets::legend(&mut figure, &chosen.legend, 16.0, 58.0, WIDTH - 32.0, layout.legend);
     let rows = layout.panels.len().div_ceil(layout.columns);
     for (i, panel) in layout.panels.iter().enumerate() {
         let (row, column) = (i / layout.columns, i % layout.columns);
@@ -70,15 +91,52 @@ pub fn draw(grid: &Grid, what: &Curves) -> Figure {
             row_head(&mut figure, grid, panel);
         }
         let lowest = !layout.by_structure || row + 1 == rows;
-        draw_panel(&mut figure, grid, what, &layout, panel, &curves[panel.place], (column == 0, lowest));
+        draw_panel(&mut figure, grid, what, &layout, &chosen, panel, &curves[panel.place], (column == 0, lowest));
     }
     figure.description = describe(grid, &curves, what);
     figure
 }
 
-fn layout(grid: &Grid) -> Layout {
-    let legend = &grid.legend;
-    let by_structure = legend.systematic && legend.variants.len() <= MOST_COLUMNS;
+fn by_structure(grid: &Grid) -> bool {
+    grid.legend.systematic && grid.legend.variants.len() <= MOST_COLUMNS
+}
+
+/// All, or of very many those with the shortest modelled frames of each scene.
+fn choose(grid: &Grid) -> Chosen {
+    let all = grid.legend.entries.iter().map(|e| e.look).collect();
+    if by_structure(grid) || grid.combinations.len() <= MOST_LINES {
+        return Chosen { legend: grid.legend.clone(), looks: all, few: None };
+    }
+    let fastest = |place: usize| -> Vec<usize> {
+        let timed = done(grid, place).filter(|(_, r)| r.culling != IDLE);
+        let mut timed: Vec<(f64, usize)> =
+            timed.filter_map(|(c, r)| Some((known("frame_ms_model").value(r)?, c))).collect();
+        timed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        timed.into_iter().take(FEW).map(|(_, c)| c).collect()
+    };
+    let few: Vec<Vec<usize>> = (0..grid.places.len()).map(fastest).collect();
+    let union: Vec<usize> = few.iter().flatten().copied().collect::<BTreeSet<_>>().into_iter().collect();
+    let legend = grid.legend.few(&union);
+    let mut looks: Vec<Look> = all;
+    union.iter().zip(&legend.entries).for_each(|(c, entry)| looks[*c] = entry.look);
+    Chosen { legend, looks, few: Some(few) }
+}
+
+/// For the caption: who is drawn, where it is not everybody.
+pub fn words(grid: &Grid) -> String {
+    match choose(grid).few {
+        None => String::new(),
+        Some(_) => format!(
+            " Of {} combinations the {FEW} with the shortest modelled frame of each scene are drawn, in looks of this \
+             chart's own; the tables hold all.",
+            grid.combinations.len()
+        ),
+    }
+}
+
+fn layout(grid: &Grid, chosen: &Chosen) -> Layout {
+    let legend = &chosen.legend;
+    let by_structure = by_structure(grid);
     let sample = if by_structure { Sample::CullingLine } else { Sample::Line };
     let top = 58.0 + facets::legend_height(legend, WIDTH - 32.0, sample);
     let of_variant = |v: usize| (0..grid.combinations.len()).filter(move |c| grid.variant_of[*c] == v).collect();
@@ -91,7 +149,10 @@ fn layout(grid: &Grid) -> Layout {
         let panels = plots.into_iter().enumerate().map(|(place, plot)| Panel {
             place,
             head: grid.places[place].clone(),
-            shown: (0..grid.combinations.len()).collect(),
+            shown: match &chosen.few {
+                Some(few) => few[place].clone(),
+                None => (0..grid.combinations.len()).collect(),
+            },
             plot,
         });
         return Layout { panels: panels.collect(), columns, by_structure, height, legend: sample };
@@ -135,6 +196,7 @@ fn draw_panel(
     grid: &Grid,
     what: &Curves,
     layout: &Layout,
+    chosen: &Chosen,
     panel: &Panel,
     curves: &[Line],
     (leftmost, lowest): (bool, bool),
@@ -162,7 +224,7 @@ fn draw_panel(
         facets::x_title(figure, plot, "frame");
     }
     for c in &panel.shown {
-        let colour = grid.legend.entries[*c].look.colour;
+        let colour = chosen.looks[*c].colour;
         let upper = curves[*c].iter().map(|p| (x.at(p.frame), y.at(p.high)));
         let lower = curves[*c].iter().rev().map(|p| (x.at(p.frame), y.at(p.low)));
         if curves[*c].iter().any(|p| p.high > p.low) {
@@ -170,7 +232,7 @@ fn draw_panel(
         }
     }
     for c in &panel.shown {
-        let look = grid.legend.entries[*c].look;
+        let look = chosen.looks[*c];
         let line: Vec<(f64, f64)> = curves[*c].iter().map(|p| (x.at(p.frame), y.at(p.middle))).collect();
         figure.dashed(&line, look.colour, 1.5, 1.0, if layout.by_structure { &[] } else { look.dash });
         if line.len() == 1 {

@@ -14,7 +14,7 @@ use super::table::{Cell, Column, Table, column, interval, number};
 use crate::results::{RunResult, RunStatus};
 
 /// A run with the index of its combination.
-type Of<'a> = (usize, &'a RunResult);
+pub(super) type Of<'a> = (usize, &'a RunResult);
 
 /// The key findings, one sentence each; plain text.
 pub fn findings(grid: &Grid, judged: &[Judged]) -> Vec<String> {
@@ -28,7 +28,7 @@ pub fn findings(grid: &Grid, judged: &[Judged]) -> Vec<String> {
     out
 }
 
-fn done<'a>(grid: &'a Grid, place: usize) -> impl Iterator<Item = Of<'a>> + 'a {
+pub(super) fn done<'a>(grid: &'a Grid, place: usize) -> impl Iterator<Item = Of<'a>> + 'a {
     let cells = grid.cells[place].iter().enumerate();
     cells.filter_map(|(c, cell)| Some((c, (*cell)?))).filter(|(_, r)| r.status == RunStatus::Done)
 }
@@ -38,8 +38,13 @@ fn frame() -> &'static Metric {
 }
 
 /// The shortest modelled frame at a place among the sound methods, or among the others.
-fn best<'a>(grid: &'a Grid, place: usize, sound: bool) -> Option<Of<'a>> {
-    let candidates = done(grid, place).filter(|(_, r)| may_lose(r) != sound);
+pub(super) fn best<'a>(grid: &'a Grid, place: usize, sound: bool) -> Option<Of<'a>> {
+    best_of(grid, place, &|r| may_lose(r) != sound)
+}
+
+/// The shortest modelled frame at a place among the runs that `keep` holds.
+pub(super) fn best_of<'a>(grid: &'a Grid, place: usize, keep: &dyn Fn(&RunResult) -> bool) -> Option<Of<'a>> {
+    let candidates = done(grid, place).filter(|(_, r)| keep(r));
     let timed = candidates.filter_map(|c| Some((c, frame().value(c.1)?)));
     timed.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(c, _)| c)
 }

@@ -28,6 +28,21 @@ pub fn register() {
     });
 }
 
+/// `text`, or as much of its beginning as fits into `room`, with an ellipsis.
+pub fn clipped(text: &str, size: f64, bold: bool, room: f64) -> String {
+    if width(text, size, bold) <= room {
+        return text.to_string();
+    }
+    let mut out = String::new();
+    for c in text.chars() {
+        if width(&format!("{out}{c}…"), size, bold) > room {
+            break;
+        }
+        out.push(c);
+    }
+    out.trim_end().to_string() + "…"
+}
+
 /// Advance of `text` at em size `size`, in the same unit.
 pub fn width(text: &str, size: f64, bold: bool) -> f64 {
     register();

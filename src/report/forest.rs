@@ -73,7 +73,7 @@ pub fn draw(judged: &[Judged]) -> Option<Figure> {
     let mut described = String::new();
     for claim in &shown {
         y += ROW;
-        let text = clipped(&claim.claim.text, left + w - 16.0 + words);
+        let text = font::clipped(&claim.claim.text, BODY, true, left + w - 16.0 + words);
         // The statement stands above its rows, over a strip that hides the grid.
         figure.rect(Rect::new(16.0, y - 14.0, left + w - 16.0 + 20.0 + words, 18.0), super::style::SHADE, 1.0);
         figure.label(20.0, y - 1.0, &text, plain(BODY, INK).bold());
@@ -106,18 +106,4 @@ pub fn draw(judged: &[Judged]) -> Option<Figure> {
                       Diamonds use modelled frame time, which is not measured."
             .into();
     Some(figure)
-}
-
-fn clipped(text: &str, width: f64) -> String {
-    if font::width(text, BODY, true) <= width {
-        return text.to_string();
-    }
-    let mut out = String::new();
-    for c in text.chars() {
-        if font::width(&format!("{out}{c}…"), BODY, true) > width {
-            break;
-        }
-        out.push(c);
-    }
-    out.trim_end().to_string() + "…"
 }

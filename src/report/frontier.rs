@@ -8,11 +8,13 @@
 //! bug and no point: it is withheld, and said to be.
 
 use super::labels::Grid;
-use super::metrics::{Kind, Metric};
+use super::metrics::{self, Kind, Metric};
 use super::pareto;
 use super::style::IDLE;
 use super::tables::class_word;
+use crate::claim::Better;
 use crate::culling::Class;
+use crate::error::Error;
 use crate::record::FrameErrors;
 use crate::results::{RunResult, RunStatus};
 use crate::stats;
@@ -63,6 +65,21 @@ pub struct Gap<'a> {
     pub run: &'a RunResult,
     pub combination: usize,
     pub why: String,
+}
+
+/// The metric of an axis: on both the lower end is where everybody wants to be.
+///
+/// # Errors
+/// For a name that is no metric, and for a metric of which more is better.
+pub fn coordinate(name: &str) -> Result<&'static Metric, Error> {
+    let metric = metrics::get(name)?;
+    match metric.better {
+        Better::Less | Better::Neither => Ok(metric),
+        Better::More => {
+            Err(Error::new(format!("more of `{name}` is better, and a front is of what is better the less it is"))
+                .help("take the time instead of the rate: frame_ms_model"))
+        }
+    }
 }
 
 /// All of one scene.

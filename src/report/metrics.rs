@@ -1,5 +1,7 @@
 //! Every number a report, a query, a comparison or a claim can be about, in one table.
 
+use super::over_frames as frame;
+use crate::claim::Better;
 use crate::error::{Error, Result, did_you_mean};
 use crate::record::TimeModel;
 use crate::results::{RunResult, RunStatus};
@@ -24,11 +26,20 @@ pub struct Metric {
     pub unit: &'static str,
     pub kind: Kind,
     pub about: &'static str,
+    /// Which of two values is the better one, where either is.
+    pub better: Better,
     /// One value a trial for measured and modelled metrics, else one value; none where unknown.
     values: fn(&RunResult) -> Vec<f64>,
     /// How the values of trials become one.
     fold: fn(&[f64]) -> f64,
 }
+
+const PARTIAL: &str = "correlation of triangles submitted and culling time of a frame, nodes visited held constant";
+const PEARSON: &str = "correlation of triangles submitted and culling time over the frames";
+const PEARSON_MODEL: &str =
+    "correlation of triangles submitted and modelled frame time, which holds them, over the frames";
+const SPEARMAN: &str = "rank correlation of triangles submitted and culling time over the frames";
+const SPEARMAN_MODEL: &str = "rank correlation of triangles submitted and modelled frame time over the frames";
 
 const MIB: f64 = 1024.0 * 1024.0;
 
@@ -39,9 +50,17 @@ const fn metric(
     about: &'static str,
     values: fn(&RunResult) -> Vec<f64>,
 ) -> Metric {
-    Metric { name, unit, kind, about, values, fold: stats::median }
+    Metric { name, unit, kind, about, values, better: Better::Less, fold: stats::median }
 }
 
+impl Metric {
+    const fn better(mut self, better: Better) -> Metric {
+        self.better = better;
+        self
+    }
+}
+
+use Better::{More, Neither};
 use Kind::{Counted, Judged, Measured, Modelled};
 
 /// Sorted by name.
@@ -50,7 +69,7 @@ pub static METRICS: &[Metric] = &[
         r.trials.iter().map(|t| t.build_ns / 1e6).collect()
     }),
     metric("cull_ms", "ms", Measured, "culling time a frame, mean over the path", |r| per_frame(r, stats::mean, 1e6)),
-    metric("depth", "levels", Counted, "depth of the tree", |r| counter(r, "depth")),
+    metric("depth", "levels", Counted, "depth of the tree", |r| counter(r, "depth")).better(Neither),
     metric(
         "duplicates",
         "entries",
@@ -83,17 +102,25 @@ pub static METRICS: &[Metric] = &[
     metric("false_culls_by_ray", "triangles", Judged, "of the false culls those that no sample sees", |r| {
         judged(r, |e| e.false_culls_by_ray as f64)
     }),
+    metric("fps_best_model", "fps", Modelled, "rate of the fastest frame, 1 over its modelled time", frame::fps_best)
+        .better(More),
+    metric("fps_mean_model", "fps", Modelled, "frames over total modelled time", frame::fps_mean).better(More),
+    metric("fps_spread_model", "", Modelled, "rate of the fastest frame over that of the slowest", frame::fps_spread)
+        .better(Neither),
+    metric("fps_worst_model", "fps", Modelled, "rate of the slowest frame, 1 over its modelled time", frame::fps_worst)
+        .better(More),
     metric("frame_ms_model", "ms", Modelled, "culling + indices + draw calls, a frame, mean over the path", |r| {
         modelled(r).iter().map(|total| total / frames(r) as f64).collect()
     }),
     metric("judged_frames", "frames", Judged, "frames compared with the truth", |r| {
         if r.errors.is_empty() { vec![] } else { vec![r.errors.len() as f64] }
-    }),
+    })
+    .better(Neither),
     metric("largest_blob_px", "px", Judged, "largest connected hole in any judged frame", |r| {
         let largest = r.errors.iter().map(|e| e.largest_blob_px).max();
         largest.map(|v| v as f64).into_iter().collect()
     }),
-    metric("leaves", "leaves", Counted, "leaves of the structure", |r| counter(r, "leaves")),
+    metric("leaves", "leaves", Counted, "leaves of the structure", |r| counter(r, "leaves")).better(Neither),
     Metric {
         fold: stats::mad,
         ..metric("mad_total_cull_ms", "ms", Measured, "median absolute deviation of the total over trials", totals)
@@ -104,7 +131,7 @@ pub static METRICS: &[Metric] = &[
     metric("median_frame_us", "µs", Measured, "culling time of the median frame", |r| {
         per_frame(r, stats::median, 1e3)
     }),
-    metric("nodes", "nodes", Counted, "nodes of the structure, root included", |r| counter(r, "nodes")),
+    metric("nodes", "nodes", Counted, "nodes of the structure, root included", |r| counter(r, "nodes")).better(Neither),
     Metric {
         fold: |v| v.iter().copied().fold(f64::NAN, f64::max),
         ..metric("noise", "", Measured, "sentinel over its usual time, worst trial; 1 is quiet", |r| {
@@ -123,9 +150,12 @@ pub static METRICS: &[Metric] = &[
     }),
     metric("p99_cull_ms", "ms", Measured, "99th percentile of culling time a frame", |r| per_frame(r, p99, 1e6)),
     metric("p99_frame_us", "µs", Measured, "99th percentile of culling time a frame", |r| per_frame(r, p99, 1e3)),
+    metric("partial_triangles_cull", "", Measured, PARTIAL, frame::partial_cull).better(Neither),
     metric("peak_rss_mib", "MiB", Measured, "peak resident memory of the trial, the scene included", |r| {
         r.trials.iter().map(|t| t.peak_rss_bytes / MIB).collect()
     }),
+    metric("pearson_triangles_cull", "", Measured, PEARSON, frame::pearson_cull).better(Neither),
+    metric("pearson_triangles_frame_model", "", Modelled, PEARSON_MODEL, frame::pearson_model).better(Neither),
     metric("potential_lost", "triangles", Judged, "members of the exact set lost, seen or hidden", |r| {
         judged(r, |e| e.potential_lost as f64)
     }),
@@ -141,7 +171,10 @@ pub static METRICS: &[Metric] = &[
             _ => vec![],
         }
     }),
-    metric("scene_triangles", "triangles", Counted, "triangles of the scene", |r| counter(r, "scene_triangles")),
+    metric("scene_triangles", "triangles", Counted, "triangles of the scene", |r| counter(r, "scene_triangles"))
+        .better(Neither),
+    metric("spearman_triangles_cull", "", Measured, SPEARMAN, frame::spearman_cull).better(Neither),
+    metric("spearman_triangles_frame_model", "", Modelled, SPEARMAN_MODEL, frame::spearman_model).better(Neither),
     metric("structure_mib", "MiB", Counted, "bytes of the structure and of the tests' columns", |r| {
         let tests = counter(r, "test_bytes").first().copied().unwrap_or(0.0);
         counter(r, "structure_bytes").iter().map(|b| (b + tests) / MIB).collect()
@@ -151,13 +184,15 @@ pub static METRICS: &[Metric] = &[
     }),
     metric("total_cull_ms", "ms", Measured, "culling time summed over the path", totals),
     metric("total_frame_ms_model", "ms", Modelled, "modelled frame time summed over the path", modelled),
-    metric("trials", "trials", Counted, "accepted trials", |r| vec![r.trials.len() as f64]),
+    metric("trials", "trials", Counted, "accepted trials", |r| vec![r.trials.len() as f64]).better(Neither),
     metric("visible_hi", "triangles", Judged, "|V_hi|: not proved invisible, mean over judged frames", |r| {
         bracketed_mean(r, |e| e.visible_hi as f64)
-    }),
+    })
+    .better(Neither),
     metric("visible_lo", "triangles", Judged, "|V_lo|: proved visible, mean over judged frames", |r| {
         judged(r, |e| e.visible as f64).iter().map(|sum| sum / r.errors.len() as f64).collect()
-    }),
+    })
+    .better(Neither),
 ];
 
 impl Metric {
@@ -180,7 +215,7 @@ impl Metric {
     /// Value with its 95 % interval over trials; equal ends where nothing varies or one trial is all there is.
     pub fn interval(&self, run: &RunResult) -> Option<(f64, f64, f64)> {
         let values = self.values(run);
-        let value = self.value(run)?;
+        let value = if values.is_empty() { None } else { Some((self.fold)(&values)) }?;
         if values.len() < 2 || self.name.starts_with("mad_") || self.name == "noise" {
             return Some((value, value, value));
         }
@@ -300,6 +335,7 @@ mod tests {
             let ours = find(claimed.name).unwrap_or_else(|| panic!("claims may name {}", claimed.name));
             assert_eq!(ours.unit, claimed.unit, "{}", ours.name);
             assert_eq!(ours.kind == Modelled, claimed.modelled, "{}", ours.name);
+            assert_eq!(ours.better, claimed.better, "{}", ours.name);
         }
     }
 

@@ -7,11 +7,13 @@
 //! ```
 //! Same results, same bytes: nothing here reads a clock, and every bootstrap has a stated seed.
 
+mod best;
 pub mod charts;
 pub mod claims;
 pub mod columns;
 pub mod compare;
 pub mod consolidate;
+pub mod correlation;
 pub mod curves;
 pub mod facets;
 pub mod facts;
@@ -26,12 +28,14 @@ pub mod frontier;
 pub mod frontier_table;
 pub mod labels;
 pub mod metrics;
+pub mod over_frames;
 mod own_value;
 pub mod page;
 mod pairs;
 pub mod pareto;
 pub mod query;
 pub mod raster;
+pub mod rates;
 pub mod regret;
 pub mod render;
 pub mod repeatability;
@@ -94,6 +98,8 @@ pub fn write_with_series(
     let mut tables = vec![
         findings::best_table(&grid),
         tables::times(&grid),
+        rates::best_table(&grid),
+        rates::all(&grid),
         tables::memory(&grid),
         tables::build(&grid),
         tables::scenes(results),

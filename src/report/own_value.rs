@@ -30,19 +30,26 @@ pub fn groups(results: &StudyResults, claim: &Claim) -> Vec<Group> {
 fn judge(claim: &Claim, name: String, runs: &[&RunResult], metric: &Metric) -> Group {
     let published = claim.published_of(&name);
     let (value, missing) = value(claim.relation, runs, metric);
+    let modelled = metric.kind == Kind::Modelled;
+    // One trial says nothing of its own spread.
+    let lonely = (modelled || metric.kind == Kind::Measured) && runs.iter().any(|r| metric.values(r).len() == 1);
     let verdict = match (value, &missing) {
         (Some(v), missing) => match decide(claim.relation, published, claim.tolerance, v) {
+            _ if lonely => Verdict::Undecided,
             // What is missing cannot undo a number above 0, but it may hide one.
             Verdict::Reproduced if missing.is_some() => Verdict::Undecided,
+            Verdict::Reproduced if modelled => Verdict::ModelOnly,
             verdict => verdict,
         },
         (None, _) => Verdict::Undecided,
     };
     let note = missing.unwrap_or_else(|| match runs.len() {
+        _ if lonely => "a single trial: no interval".into(),
         1 => String::new(),
         n => format!("over {n} runs"),
     });
-    Group { name, stated: stated(claim, published), verdict, ratio: value, model_ratio: None, note }
+    let (ratio, model_ratio) = if modelled { (None, value) } else { (value, None) };
+    Group { name, stated: stated(claim, published), verdict, ratio, model_ratio, note }
 }
 
 /// The largest (`zero`) or the mean (`value`) over the runs with its interval, and

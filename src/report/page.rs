@@ -7,6 +7,7 @@ use super::findings::findings;
 use super::font;
 use super::format::{capital, count, html};
 use super::labels::Grid;
+use super::rates;
 use super::repeatability::Repeatability;
 use super::style::DARK;
 use super::sweeps::Chart;
@@ -77,6 +78,7 @@ pub fn document(content: &Content) -> String {
     }
     let time = ["total-time-modelled", "total-time", "time-per-frame", "triangles-per-frame"];
     out += &section("times-section", "Time and work", &(figures(content, &time) + &table(content, "times")));
+    out += &section("rates-section", "Frames per second, and time against triangles", &rates_html(content));
     let front = ["time-against-error-modelled", "time-against-error", "time-against-over-submission"];
     let body = figures(content, &front);
     if !body.is_empty() {
@@ -141,6 +143,7 @@ fn header(content: &Content) -> String {
     }
     links.extend([
         ("times-section", "Time and work"),
+        ("rates-section", "Frames per second"),
         ("frontier-section", "Time against error"),
         ("errors-section", "Errors"),
     ]);
@@ -192,6 +195,18 @@ fn sweeps_html(content: &Content) -> String {
                 let _ = writeln!(out, "<p class=\"note\">Not drawn: {}</p>", html(why));
             }
         }
+    }
+    out
+}
+
+fn rates_html(content: &Content) -> String {
+    let mut out = format!("<p>{}</p>\n{}", html(rates::WORDS), table(content, "rates-best"));
+    out += &figures(content, &["triangles-against-time"]);
+    let all = table(content, "rates");
+    if !all.is_empty() {
+        let runs = count(content.grid.results.runs.len() as u64, "run", "runs");
+        let _ =
+            writeln!(out, "<details><summary>All {runs}, the fastest of each scene first</summary>\n{all}</details>");
     }
     out
 }
@@ -258,10 +273,17 @@ fn claims_html(content: &Content) -> String {
     out + &table(content, "claims")
 }
 
+/// Charts that are higher than some screens are folded: of hundreds of rows one looks up a few.
+const TALL: f64 = 2200.0;
+
 fn figures(content: &Content, ids: &[&str]) -> String {
     let mut out = String::new();
     for (figure, svg) in content.figures.iter().zip(content.svgs).filter(|(f, _)| ids.contains(&f.id.as_str())) {
         let id = &figure.id;
+        let tall = figure.height > TALL;
+        if tall {
+            let _ = writeln!(out, "<details class=\"tall\"><summary>{}</summary>", html(&figure.title));
+        }
         let _ = writeln!(
             out,
             "<figure id=\"{id}\">\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\">\n{svg}</div>\n\
@@ -270,6 +292,9 @@ fn figures(content: &Content, ids: &[&str]) -> String {
             html(&figure.title),
             html(&figure.caption),
         );
+        if tall {
+            out += "</details>\n";
+        }
     }
     out
 }

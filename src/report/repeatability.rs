@@ -75,8 +75,21 @@ pub struct Repeatability<'a> {
     pub unpaired: usize,
 }
 
-/// Measured, but saying again what another metric says, or about the noise itself.
-const LEFT_OUT: [&str; 5] = ["cull_ms", "mad_total_cull_ms", "noise", "p99_cull_ms", "total_frame_ms_model"];
+/// Measured, but saying again what another metric says, or about the noise itself, or a
+/// correlation, of which a ratio says nothing.
+const LEFT_OUT: [&str; 11] = [
+    "cull_ms",
+    "fps_mean_model",
+    "mad_total_cull_ms",
+    "noise",
+    "p99_cull_ms",
+    "partial_triangles_cull",
+    "pearson_triangles_cull",
+    "pearson_triangles_frame_model",
+    "spearman_triangles_cull",
+    "spearman_triangles_frame_model",
+    "total_frame_ms_model",
+];
 
 pub fn of(all: &[Measured]) -> Repeatability<'_> {
     let mut out = Repeatability {

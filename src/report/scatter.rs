@@ -11,7 +11,8 @@ use super::labels::Grid;
 use super::metrics::Metric;
 use super::rows;
 use super::scale::{BREAK, Kind, Scale};
-use super::style::{ALARM, FRAME, INK, MUTED, SHADE};
+use super::style::{ALARM, FRAME, INK, Look, MUTED, SHADE, Shape};
+use std::collections::BTreeSet;
 
 pub struct Scatter<'a> {
     pub id: &'a str,
@@ -39,18 +40,31 @@ pub fn draw(grid: &Grid, what: &Scatter) -> Figure {
     let (left, gap) = (74.0, (84.0, 78.0));
     let width = left + columns as f64 * w + (columns as f64 - 1.0) * gap.0 + 28.0;
     let inner = width - 32.0;
-    let top = 58.0 + facets::legend_height(&grid.legend, inner, Sample::Marker) + 18.0 + 26.0;
+    // Where looks repeat a legend of all would name nobody.
+    let many = grid.legend.overflows();
+    let leading: BTreeSet<usize> = all.iter().flat_map(|f| f.on_front().map(|p| p.combination)).collect();
+    let keep: Vec<usize> = leading.into_iter().collect();
+    let legend = if many { grid.legend.few(&keep) } else { grid.legend.clone() };
+    let look = |c: usize| match keep.iter().position(|k| *k == c) {
+        _ if !many => grid.legend.entries[c].look,
+        Some(i) => legend.entries[i].look,
+        None => Look { colour: MUTED, shape: Shape::Circle, dash: &[] },
+    };
+    let top = 58.0 + facets::legend_height(&legend, inner, Sample::Marker) + 18.0 + 26.0;
     let height = top + rows as f64 * h + (rows as f64 - 1.0) * gap.1 + 46.0;
     let mut figure = Figure::new(what.id, what.title, width, height);
     facets::title(&mut figure, what.title, what.sub);
-    facets::legend(&mut figure, &grid.legend, 16.0, 58.0, inner, Sample::Marker);
+    facets::legend(&mut figure, &legend, 16.0, 58.0, inner, Sample::Marker);
     standings_legend(&mut figure, top - 34.0);
     let mut words = format!("{}. {} against {}. ", what.title, what.y_axis, what.x_axis);
     for (front, plot) in all.iter().zip(facets::panels(all.len(), columns, left, top, (w, h), gap)) {
         figure.part(Part::Plot, plot);
-        panel(&mut figure, grid, what, front, plot);
+        panel(&mut figure, grid, what, front, plot, &look);
         let names: Vec<&str> = front.on_front().map(|p| grid.combinations[p.combination].as_str()).collect();
         words += &format!("{}: on the front {}. ", front.place, names.join(", "));
+    }
+    if many {
+        figure.label(16.0 + inner, top - 34.0, "grey: not on the front of any scene", plain(SMALL, MUTED).end());
     }
     figure.description = words.trim_end().to_string();
     figure
@@ -66,18 +80,13 @@ fn standings_legend(figure: &mut Figure, y: f64) {
         (Standing::Noise, "within noise of the front"),
         (Standing::Dominated, "dominated beyond the intervals"),
     ] {
-        mark(
-            figure,
-            (x + 6.0, y - 3.6),
-            standing,
-            super::style::Look { colour: INK, shape: super::style::Shape::Circle, dash: &[] },
-        );
+        mark(figure, (x + 6.0, y - 3.6), standing, Look { colour: INK, shape: Shape::Circle, dash: &[] });
         let r = figure.label(x + 17.0, y, words, plain(facets::BODY, INK));
         x = r.right() + 20.0;
     }
 }
 
-fn mark(figure: &mut Figure, (x, y): (f64, f64), standing: Standing, look: super::style::Look) {
+fn mark(figure: &mut Figure, (x, y): (f64, f64), standing: Standing, look: Look) {
     match standing {
         Standing::Front | Standing::Contested => figure.marker(x, y, 5.0, look.shape, look.colour, 1.0),
         Standing::Noise => figure.hollow(x, y, 4.6, look.shape, look.colour),
@@ -92,7 +101,7 @@ fn at_least(what: &Scatter, p: &Point) -> Option<f64> {
     if what.y.name == "over_submission" { over_submission(p.run)?.0 } else { None }
 }
 
-fn panel(figure: &mut Figure, grid: &Grid, what: &Scatter, front: &Front, plot: Rect) {
+fn panel(figure: &mut Figure, grid: &Grid, what: &Scatter, front: &Front, plot: Rect, look: &dyn Fn(usize) -> Look) {
     let ys: Vec<f64> = front.points.iter().map(|p| p.y.0).collect();
     let zeros = ys.iter().filter(|y| **y <= 0.0).count();
     facets::panel_head(figure, plot, &front.place, &notes(what, front, zeros));
@@ -141,7 +150,7 @@ fn panel(figure: &mut Figure, grid: &Grid, what: &Scatter, front: &Front, plot: 
             let p = dot.point;
             let low = at_least(what, p);
             tagged(figure, grid, p, describe(what, p, low), |figure| {
-                let look = grid.legend.entries[p.combination].look;
+                let look = look(p.combination);
                 let alpha = if wanted == Standing::Dominated { FADED } else { 0.9 };
                 let (x0, x1) = (x.at(p.x.1), x.at(p.x.2));
                 if x1 - x0 > 1.0 {

@@ -123,6 +123,17 @@ impl Legend {
         legend
     }
 
+    /// Of the entries these alone, each with a look of its own: for charts that cannot show all.
+    pub fn few(&self, keep: &[usize]) -> Legend {
+        let look = |(i, c): (usize, &usize)| Entry { look: Look::nth(i), ..self.entries[*c].clone() };
+        Legend { entries: keep.iter().enumerate().map(look).collect(), ..Legend::default() }
+    }
+
+    /// More combinations than there are markers: some look alike.
+    pub fn overflows(&self) -> bool {
+        !self.systematic && self.entries.len() > PALETTE.len() * SHAPES.len()
+    }
+
     /// An entry with a look of its own, for what is no combination.
     pub fn add(&mut self, label: &str) {
         if !self.entries.iter().any(|e| e.label == label) {

@@ -12,12 +12,12 @@ use crate::record::Winding;
 use crate::results::{RunResult, RunStatus, StudyResults};
 
 /// The column of a metric under a heading for people.
-fn of(metric: &'static Metric, heading: &str) -> Column {
+pub(super) fn of(metric: &'static Metric, heading: &str) -> Column {
     let c = column(heading, metric.unit, metric.about);
     if matches!(metric.kind, Kind::Measured | Kind::Modelled) { c.with_interval() } else { c }
 }
 
-fn cell(metric: &Metric, run: &RunResult) -> Cell {
+pub(super) fn cell(metric: &Metric, run: &RunResult) -> Cell {
     match metric.kind {
         Kind::Measured | Kind::Modelled => interval(metric.interval(run)),
         Kind::Counted | Kind::Judged => number(metric.value(run)),
@@ -37,7 +37,7 @@ fn by_run(grid: &Grid, id: &str, title: &str, metrics: &[(&str, &str)]) -> Table
     table
 }
 
-fn named(grid: &Grid, names: &Names) -> Cell {
+pub(super) fn named(grid: &Grid, names: &Names) -> Cell {
     Cell::Named(names.combination.clone(), grid.look(&names.combination))
 }
 
@@ -158,7 +158,7 @@ pub fn errors(grid: &Grid) -> Table {
     table
 }
 
-fn class_of(run: &RunResult) -> Cell {
+pub(super) fn class_of(run: &RunResult) -> Cell {
     let dagger = if rows::may_lose(run) { "† " } else { "" };
     run.class.map_or(Cell::Missing, |c| Cell::Text(format!("{dagger}{}", class_word(c))))
 }

@@ -2,6 +2,8 @@
 
 #[path = "report/axes.rs"]
 mod axes;
+#[path = "report/best.rs"]
+mod best;
 #[path = "report/columns.rs"]
 mod columns;
 #[path = "report/fixture.rs"]
@@ -10,17 +12,21 @@ mod fixture;
 mod frontier;
 #[path = "report/own_values.rs"]
 mod own_values;
+#[path = "report/rates.rs"]
+mod rates;
 #[path = "report/regret.rs"]
 mod regret;
 #[path = "report/repeatability.rs"]
 mod repeatability;
 #[path = "report/sweeps.rs"]
 mod sweeps;
+#[path = "report/verdicts.rs"]
+mod verdicts;
 #[path = "report/xml.rs"]
 mod xml;
 
 use cullmark::claim::Relation;
-use cullmark::report::claims::{Verdict, combine, decide, judge};
+use cullmark::report::claims::{Verdict, judge};
 use cullmark::report::compare::{Change, PAIRED, compare};
 use cullmark::report::fields::Fields;
 use cullmark::report::figure::{Figure, Part};
@@ -44,6 +50,8 @@ fn figures(results: &StudyResults) -> Vec<Figure> {
 fn a_report_is_one_page_with_charts_and_tables_and_the_same_bytes_again() {
     if let Some(dir) = std::env::var_os(KEEP) {
         report::write(&fixture::large(), &fixture::claims(), Path::new(&dir)).unwrap();
+        report::write(&fixture::wide(&fixture::SCENES[..6], 400, 5), &fixture::claims(), &Path::new(&dir).join("wide"))
+            .unwrap();
     }
     let (a, b) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     // Small and pale: PNGs of a debug build are slow.
@@ -51,7 +59,7 @@ fn a_report_is_one_page_with_charts_and_tables_and_the_same_bytes_again() {
     results.title = "A <script>alert('x')</script> & \"quotes\"".into();
     let files = report::write(&results, &fixture::claims(), a.path()).unwrap();
     report::write(&results, &fixture::claims(), b.path()).unwrap();
-    assert_eq!(files.charts.len(), 20, "{:?}", files.charts);
+    assert_eq!(files.charts.len(), 22, "{:?}", files.charts);
     for file in files.charts.iter().chain(&files.tables).chain([&files.page]) {
         let other = b.path().join(file.strip_prefix(a.path()).unwrap());
         assert!(std::fs::read(file).unwrap() == std::fs::read(&other).unwrap(), "{} differs", file.display());
@@ -65,7 +73,7 @@ fn a_report_is_one_page_with_charts_and_tables_and_the_same_bytes_again() {
         let around = &page[i.saturating_sub(40)..i + 30];
         assert!(around.contains("xmlns=") || around.contains("http-equiv"), "{around}");
     }
-    for id in ["findings", "claims-section", "gaps", "times-section", "errors-section", "methods"] {
+    for id in ["findings", "claims-section", "gaps", "times-section", "rates-section", "errors-section", "methods"] {
         assert!(page.contains(&format!("<section id=\"{id}\"")), "{id}");
     }
     for words in
@@ -85,7 +93,8 @@ fn svgs_are_xml_and_name_every_scene_and_combination() {
         for place in &grid.places {
             assert!(texts.iter().any(|t| t == place), "{} lacks {place}", figure.id);
         }
-        if figure.id != "claims" {
+        // Of claims, and of the best of each scene alone.
+        if !["claims", "triangles-against-time"].contains(&figure.id.as_str()) {
             // By its whole label, or by its structure and its culling.
             let has = |name: &str| texts.iter().any(|t| t == name);
             for (label, entry) in grid.combinations.iter().zip(&grid.legend.entries) {
@@ -100,7 +109,38 @@ fn svgs_are_xml_and_name_every_scene_and_combination() {
 
 #[test]
 fn nothing_overlaps_with_seven_scenes_and_twelve_combinations() {
-    for figure in figures(&fixture::sized(&fixture::SCENES, 60, 2)) {
+    nothing_overlaps(&fixture::sized(&fixture::SCENES, 60, 2));
+}
+
+#[test]
+fn a_hundred_combinations_are_not_all_drawn_where_nobody_could_tell_them_apart() {
+    let results = fixture::wide(&fixture::SCENES[..2], 60, 2);
+    nothing_overlaps(&results);
+    let drawn = figures(&results);
+    let named = |id: &str| {
+        let figure = drawn.iter().find(|f| f.id == id).unwrap_or_else(|| panic!("no {id}"));
+        let texts = xml::texts(&render::svg(figure, true).unwrap()).unwrap();
+        let labels = &Grid::of(&results).combinations;
+        (figure, labels.iter().filter(|l| texts.contains(l)).count())
+    };
+    // Six of each scene, the same in both.
+    for id in ["time-per-frame", "triangles-per-frame"] {
+        let (figure, names) = named(id);
+        assert!((6..=12).contains(&names) && figure.caption.contains("Of 128 combinations the 6"), "{id}: {names}");
+    }
+    let (_, names) = named("time-against-error");
+    assert!((1..42).contains(&names), "looks would repeat: {names}");
+    assert_eq!(named("total-time").1, 128, "rows have room for everybody");
+    let results = fixture::wide(&fixture::SCENES[..1], 20, 2);
+    let folder = tempfile::tempdir().unwrap();
+    let page = std::fs::read_to_string(report::write(&results, &[], folder.path()).unwrap().page).unwrap();
+    let folded = page.find("<details class=\"tall\">").expect("tall charts are folded");
+    assert!(page[folded..].starts_with("<details class=\"tall\"><summary>Total frame time"), "with their titles");
+    assert!(page.contains("<summary>All 128 runs, the fastest of each scene first</summary>"));
+}
+
+fn nothing_overlaps(results: &StudyResults) {
+    for figure in figures(results) {
         let of = |part: Part| figure.boxes.iter().filter(move |(p, _)| *p == part).map(|(_, r)| *r);
         for legend in of(Part::Legend) {
             assert!(of(Part::Plot).all(|plot| !plot.overlaps(&legend)), "{}: the legend covers data", figure.id);
@@ -259,50 +299,6 @@ fn a_query_sorts_cuts_and_prints_in_every_format() {
     assert_eq!(csv.lines().count(), 5);
     let e = query(&results, &Query { columns: vec!["totl_cull_ms".into()], ..Default::default() }).unwrap_err();
     assert!(e.to_string().contains("did you mean `total_cull_ms`"), "{e}");
-}
-
-#[test]
-fn an_interval_decides_a_claim_only_when_it_lies_on_one_side() {
-    use Verdict::{Contradicted, Reproduced, Undecided};
-    let published = Some([3.5, 3.9]);
-    for (relation, (low, high), expected) in [
-        (Relation::Less, (0.7, 0.9), Reproduced),
-        (Relation::Less, (0.9, 1.1), Undecided),
-        (Relation::Less, (1.1, 1.2), Contradicted),
-        (Relation::Less, (1.0, 1.0), Contradicted),
-        (Relation::Greater, (1.2, 1.5), Reproduced),
-        (Relation::Greater, (0.8, 0.99), Contradicted),
-        // 2.8 to 4.68 with a tolerance of a fifth.
-        (Relation::Ratio, (2.9, 4.6), Reproduced),
-        (Relation::Ratio, (2.7, 3.0), Undecided),
-        (Relation::Ratio, (1.0, 2.0), Contradicted),
-        (Relation::Ratio, (5.0, 6.0), Contradicted),
-        (Relation::Grows, (0.2, 0.9), Reproduced),
-        (Relation::Grows, (-0.2, 0.9), Undecided),
-        (Relation::Greater, (f64::NAN, f64::NAN), Undecided),
-    ] {
-        let found = decide(relation, published, 0.2, ((low + high) / 2.0, low, high));
-        assert_eq!(found, expected, "{relation:?} [{low}, {high}]");
-    }
-    assert_eq!(decide(Relation::Ratio, None, 0.2, (1.0, 1.0, 1.0)), Undecided, "nothing was published");
-}
-
-#[test]
-fn agreement_of_the_model_alone_is_called_that() {
-    use Verdict::{Contradicted, ModelOnly, Reproduced, Undecided};
-    for (claim_is_modelled, measured, model, expected) in [
-        (false, Some(Reproduced), Some(Contradicted), Reproduced),
-        (false, Some(Contradicted), Some(Reproduced), ModelOnly),
-        (false, Some(Undecided), Some(Reproduced), ModelOnly),
-        (false, Some(Contradicted), Some(Undecided), Contradicted),
-        (false, None, Some(Reproduced), ModelOnly),
-        (true, Some(Reproduced), Some(Reproduced), Reproduced),
-        (true, Some(Contradicted), Some(Reproduced), ModelOnly),
-        (true, Some(Reproduced), Some(Contradicted), Contradicted),
-        (false, None, None, Undecided),
-    ] {
-        assert_eq!(combine(claim_is_modelled, measured, model), expected);
-    }
 }
 
 #[test]

@@ -18,7 +18,12 @@ const ALL_AT_ONCE = 6;
 /** Choices, legend and a chart for every scene. */
 export async function mount(panel, study) {
   const { signal } = study;
-  const { metrics, scenes } = study.detail;
+  const { scenes } = study.detail;
+  // Names alone would not say what is less and better.
+  const catalog = await metricCatalog();
+  if (signal.aborted) return null;
+  // Of rates more is better: their front would be that of the worst.
+  const metrics = study.detail.metrics.filter((m) => catalog.get(m)?.better !== "more");
   const query = readQuery();
   const state = {
     x: metrics.includes(query.x) ? query.x : firstOf(metrics, "total_cull_ms", "cull_ms"),
@@ -29,9 +34,6 @@ export async function mount(panel, study) {
   };
   // Switched off in the legend; not in the address, since it is a way of looking.
   const off = { culling: new Set(), variant: new Set() };
-  // Names alone would not say what is less and better.
-  const catalog = await metricCatalog();
-  if (signal.aborted) return null;
   if (!state.x) {
     set(panel, empty("No values yet", h("p", null, "Fronts are drawn as soon as runs are finished.")));
     const live = throttle(() => study.reload(), LIVE_MS);

@@ -106,7 +106,7 @@ export async function mount(panel, study) {
       ),
       h(
         "label",
-        { class: "check", title: "Each value over the least of its scene: 1 is the best there" },
+        { class: "check", title: "Each value beside the best of its scene: 1 is the best there" },
         relative,
         "relative to the best of the scene",
       ),
@@ -155,7 +155,7 @@ export async function mount(panel, study) {
     if (matrix.cells.ordinal.length === 0)
       return set(body, empty(study.where ? "No run matches the filter" : "The study has no runs"));
     const turned = state.turn === "auto" ? matrix.columns.length > matrix.rows.length : state.turn === "down";
-    data = heatData(matrix, { turned, relative: state.relative });
+    data = heatData(matrix, { turned, relative: state.relative, more: more() });
     const log = state.scale === "auto" ? wantsLog(data.values) : state.scale === "log";
     if (!map.node.isConnected) set(body, row, map.node, note);
     // Counts change while the study runs; the map itself stays, and with it the focus.
@@ -170,7 +170,13 @@ export async function mount(panel, study) {
   }
 
   // Said only where it is the case.
-  const best = () => (state.relative ? "Shown over the least value of its scene: 1 is the best there. " : "");
+  const more = () => catalog.get(state.metric)?.better === "more";
+  const best = () =>
+    !state.relative
+      ? ""
+      : more()
+        ? "Shown as the greatest value of its scene over it: 1 is the best there. "
+        : "Shown over the least value of its scene: 1 is the best there. ";
   const zeros = (log) =>
     log && data.values.some((v) => v !== null && v <= 0)
       ? "Zeros have the colour of the least value: a logarithm has no place for them."
@@ -275,7 +281,7 @@ export async function mount(panel, study) {
         cellNode(known ?? cell.value, `no value: ${cell.status}`),
         cell.value !== null && unit ? ` ${unit}` : "",
       ]),
-      data.relative && cell.shown !== null && tipLine("over the best", `${number(cell.shown)} ×`),
+      data.relative && cell.shown !== null && tipLine(more() ? "the best over it" : "over the best", `${number(cell.shown)} ×`),
       h(
         "div",
         null,

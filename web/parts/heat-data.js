@@ -8,20 +8,21 @@ const NO_COLOUR = 255;
 
 /**
  * Indexes the parallel lists of a matrix. `turned` swaps the axes: what is across and
- * what is down; `relative` divides each value by the least of its scene.
+ * what is down; `relative` divides each value by the least of its scene or, where `more` is
+ * better, the greatest by the value: 1 is the best there either way.
  */
-export function heatData(matrix, { turned, relative }) {
+export function heatData(matrix, { turned, relative, more = false }) {
   const { rows, columns, cells } = matrix;
   const [across, down] = turned ? [rows, columns] : [columns, rows];
   const at = new Int32Array(across.length * down.length).fill(-1);
   const size = cells.ordinal.length;
-  const least = relative ? leastOfRows(cells, rows.length) : null;
+  const best = relative ? bestOfRows(cells, rows.length, more) : null;
   const values = new Array(size);
   for (let k = 0; k < size; k += 1) {
     const [row, column] = [cells.row[k], cells.column[k]];
     at[turned ? column * across.length + row : row * across.length + column] = k;
     const v = cells.value[k];
-    values[k] = v === null || v === undefined ? null : least ? v / least[row] : v;
+    values[k] = v === null || v === undefined ? null : best ? (more ? best[row] / v : v / best[row]) : v;
     if (!Number.isFinite(values[k])) values[k] = null;
   }
   return {
@@ -46,13 +47,13 @@ export function heatData(matrix, { turned, relative }) {
   };
 }
 
-function leastOfRows(cells, rows) {
-  const least = new Float64Array(rows).fill(Infinity);
+function bestOfRows(cells, rows, more) {
+  const best = new Float64Array(rows).fill(more ? 0 : Infinity);
   for (let k = 0; k < cells.value.length; k += 1) {
     const v = cells.value[k];
-    if (v > 0 && v < least[cells.row[k]]) least[cells.row[k]] = v;
+    if (v > 0 && (more ? v > best[cells.row[k]] : v < best[cells.row[k]])) best[cells.row[k]] = v;
   }
-  return least;
+  return best;
 }
 
 function countStatuses(list) {

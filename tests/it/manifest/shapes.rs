@@ -213,6 +213,38 @@ for_each = "scene"
 }
 
 #[test]
+fn a_claim_of_the_best_and_a_value_below_0_read_whole() {
+    let (manifest, _) = whole(
+        r#"[matrix]
+structure = ["octree:depth=4", "octree:depth=5", "bsp"]
+culling = ["frustum"]
+[[claim]]
+id = "depth_5"
+text = "five levels are best"
+source = "somebody 2009"
+metric = "fps_mean_model"
+numerator = { structure = "octree:depth=5" }
+denominator = { structure = ["octree", "*"] }
+relation = "best"
+for_each = "scene"
+published = { a = 0.8 }
+[[claim]]
+id = "r"
+text = "time falls with triangles"
+source = "nobody"
+metric = "pearson_triangles_cull"
+numerator = { structure = "bsp" }
+relation = "value"
+published = [-0.9, 0.1]
+"#,
+        &[],
+    );
+    let claims = manifest.claims();
+    assert_eq!((claims[0].relation, claims[0].published_of("a")), (Relation::Best, Some([0.8, 0.8])));
+    assert_eq!(claims[1].published, Some([-0.9, 0.1]));
+}
+
+#[test]
 fn a_plan_says_what_is_new_done_and_run_again_and_why() {
     let (manifest, matrix) = whole(
         "[matrix]\nstructure = [\"list\", \"octree\", \"bsp\"]\nculling = [\"none\", \"frustum\"]\n[[exclude]]\nstructure = \"bsp\"\nculling = \"none\"\nwhy = \"nobody asks\"",

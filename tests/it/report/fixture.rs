@@ -203,6 +203,30 @@ pub fn large() -> StudyResults {
     sized(&SCENES, 2000, 5)
 }
 
+/// 16 structures x 8 cullings a scene; of six 768 runs, as when a whole paper is done again.
+pub fn wide(scenes: &[(&str, f64)], frames: usize, trials: u32) -> StudyResults {
+    let mut results = sized(&SCENES[..1], 30, 3);
+    results.runs.clear();
+    let depths = |kind: &str, key: &str, of: [u32; 5]| of.map(|d| format!("{kind}:{key}={d}"));
+    let mut structures = vec!["list".to_string()];
+    structures.extend(depths("octree", "depth", [3, 4, 5, 6, 7]));
+    structures.extend(depths("bsp", "min_leaf", [25, 50, 100, 200, 400]));
+    structures.extend(depths("list", "leaf_size", [8, 16, 32, 128, 256]));
+    let masks = ["octant_mask", "normal_mask", "octant_mask+normal_mask"];
+    let cullings = ["none", "frustum"].map(String::from).into_iter().chain(masks.map(String::from));
+    let cullings: Vec<String> = cullings.chain(masks.map(|m| format!("frustum+{m}"))).collect();
+    for (s, (scene, triangles)) in scenes.iter().enumerate() {
+        for (i, structure) in structures.iter().enumerate() {
+            for (j, culling) in cullings.iter().enumerate() {
+                let seed = (1000 * s + 10 * i + j) as u64;
+                results.runs.push(run(scene, *triangles, structure, culling, frames, trials, seed));
+            }
+        }
+    }
+    withhold(&mut results.runs[77], RunStatus::Failed, Some("timed out after 30 s in trial 2"));
+    results
+}
+
 /// 3 scenes x 12 combinations with every status.
 pub fn study() -> StudyResults {
     sized(&SCENES[..3], 120, 3)

@@ -199,6 +199,7 @@ fn mistakes_in_requests_are_named_and_show_no_path_of_the_server() {
         ("GET", "/studies/town/runs?colums=scene", "", 400, "colums"),
         ("GET", "/studies/town/matrix?metric=speed", "", 400, "speed"),
         ("GET", "/studies/town/front?x=speed", "", 400, "speed"),
+        ("GET", "/studies/town/front?x=fps_mean_model", "", 400, "more of"),
         ("GET", "/studies/town/front?scene=moon", "", 400, "moon"),
         ("GET", "/studies/town/charts/none.svg", "", 404, "none"),
         ("GET", "/studies/town/charts/total-time.gif", "", 404, "total-time.gif"),
