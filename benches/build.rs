@@ -25,6 +25,12 @@ const STRUCTURES: &[&str] = &[
     "bsp",
     "bsp:layout=binary",
     "bsp:sample=1000000000",
+    "bvh",
+    "bvh:leaf_size=4",
+    "bvh:leaf_size=4,stop=cost",
+    "bvh:split=median",
+    "bvh:split=morton",
+    "bvh:split=morton,leaf_size=4",
 ];
 
 fn main() {

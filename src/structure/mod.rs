@@ -3,6 +3,7 @@
 
 pub mod bsp;
 pub mod builder;
+pub mod bvh;
 pub mod list;
 pub mod octree;
 
@@ -20,7 +21,7 @@ pub trait Structure: Send + Sync {
 }
 
 /// Sorted by name.
-pub static ALL: &[Entry<dyn Structure>] = &[bsp::ENTRY, list::ENTRY, octree::ENTRY];
+pub static ALL: &[Entry<dyn Structure>] = &[bsp::ENTRY, bvh::ENTRY, list::ENTRY, octree::ENTRY];
 
 /// The structure that `spec` names, with the spec's defaults filled in.
 pub fn make(spec: &Spec) -> Result<(Box<dyn Structure>, Spec)> {

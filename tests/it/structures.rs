@@ -1,6 +1,7 @@
 //! Structures: every triangle kept, bounds that hold, counts in the paper's terms.
 
 mod bsp;
+mod bvh;
 mod policies;
 
 use crate::common::soup;
@@ -104,8 +105,20 @@ const BSPS: &[&str] = &[
     "bsp:min_leaf=80,split_weight=100,axis_penalty=0,sample=64,layout=binary",
 ];
 
+const BVHS: &[&str] = &[
+    "bvh",
+    "bvh:layout=binary",
+    "bvh:leaf_size=1",
+    "bvh:leaf_size=20,bins=5",
+    "bvh:leaf_size=20,stop=cost,layout=binary",
+    "bvh:leaf_size=4,bins=32,layout=binary",
+    "bvh:split=median,leaf_size=10",
+    "bvh:split=morton",
+    "bvh:split=morton,leaf_size=1,layout=binary",
+];
+
 fn all() -> impl Iterator<Item = &'static str> {
-    [LISTS, OCTREES, REPLICATED, SPLIT, BSPS].into_iter().flatten().copied()
+    [LISTS, OCTREES, REPLICATED, SPLIT, BSPS, BVHS].into_iter().flatten().copied()
 }
 
 /// Large triangles through each other: small leaves need more pieces than a BSP may make.
@@ -171,7 +184,7 @@ fn the_number_of_threads_changes_nothing() {
     let large = soup(3, 150_000, 100.0, 1.0);
     let small = soup(4, 12_000, 40.0, 1.0);
     for text in all() {
-        let scene = if LISTS.contains(&text) || OCTREES.contains(&text) { &large } else { &small };
+        let scene = if [LISTS, OCTREES, BVHS].iter().any(|l| l.contains(&text)) { &large } else { &small };
         let (s, _) = structure::make(&Spec::parse(text).unwrap()).unwrap();
         let [a, b] = [1, 2].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -21,6 +21,7 @@ fn structures() -> Vec<String> {
         }
     }
     all.extend(["wide", "binary"].map(|layout| format!("bsp:min_leaf=40,layout={layout}")));
+    all.extend(["bvh:leaf_size=16".to_string(), "bvh:split=morton,leaf_size=24,layout=binary".into()]);
     all
 }
 
