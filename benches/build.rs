@@ -35,6 +35,12 @@ const STRUCTURES: &[&str] = &[
     "kd_tree",
     "kd_tree:split=median",
     "kd_tree:policy=R",
+    "bvh",
+    "bvh:leaf_size=4",
+    "bvh:leaf_size=4,stop=cost",
+    "bvh:split=median",
+    "bvh:split=morton",
+    "bvh:split=morton,leaf_size=4",
 ];
 
 fn main() {

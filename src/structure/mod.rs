@@ -3,6 +3,7 @@
 
 pub mod bsp;
 pub mod builder;
+pub mod bvh;
 pub mod hybrid;
 pub mod irregular_grid;
 pub mod kd_tree;
@@ -27,6 +28,7 @@ pub trait Structure: Send + Sync {
 /// Sorted by name.
 pub static ALL: &[Entry<dyn Structure>] = &[
     bsp::ENTRY,
+    bvh::ENTRY,
     hybrid::ENTRY,
     irregular_grid::ENTRY,
     kd_tree::ENTRY,

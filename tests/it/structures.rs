@@ -1,6 +1,7 @@
 //! Structures: every triangle kept, bounds that hold, counts in the paper's terms.
 
 mod bsp;
+mod bvh;
 mod grids;
 mod kd_tree;
 mod policies;
@@ -146,10 +147,27 @@ const BSPS: &[&str] = &[
     "bsp:min_leaf=80,split_weight=100,axis_penalty=0,sample=64,layout=binary",
 ];
 
-const HYBRIDS: &[&str] = &["hybrid:inner=bsp,leaf_size=200,dense=300,depth=1"];
+const HYBRIDS: &[&str] = &[
+    "hybrid:inner=bsp,leaf_size=200,dense=300,depth=1",
+    "hybrid",
+    "hybrid:inner=kd_tree,dense=70",
+    "hybrid:depth=0,dense=20,leaf_size=4",
+];
+
+const BVHS: &[&str] = &[
+    "bvh",
+    "bvh:layout=binary",
+    "bvh:leaf_size=1",
+    "bvh:leaf_size=20,bins=5",
+    "bvh:leaf_size=20,stop=cost,layout=binary",
+    "bvh:leaf_size=4,bins=32,layout=binary",
+    "bvh:split=median,leaf_size=10",
+    "bvh:split=morton",
+    "bvh:split=morton,leaf_size=1,layout=binary",
+];
 
 fn all() -> impl Iterator<Item = &'static str> {
-    [LISTS, OCTREES, LOOSE, REPLICATED, SPLIT, BSPS, HYBRIDS].into_iter().flatten().copied()
+    [LISTS, OCTREES, LOOSE, REPLICATED, SPLIT, BSPS, BVHS, HYBRIDS].into_iter().flatten().copied()
 }
 
 /// Large triangles through each other: small leaves need more pieces than a BSP may make.
@@ -215,7 +233,7 @@ fn the_number_of_threads_changes_nothing() {
     let large = soup(3, 150_000, 100.0, 1.0);
     let small = soup(4, 12_000, 40.0, 1.0);
     for text in all() {
-        let fast = [LISTS, OCTREES, LOOSE].iter().any(|all| all.contains(&text));
+        let fast = [LISTS, OCTREES, LOOSE, BVHS].iter().any(|all| all.contains(&text));
         let scene = if fast { &large } else { &small };
         let (s, _) = structure::make(&Spec::parse(text).unwrap()).unwrap();
         let [a, b] = [1, 2].map(|threads| {

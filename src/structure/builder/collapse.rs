@@ -3,39 +3,97 @@
 //! largest child until it is full. Leaves, their order and their boxes stay.
 
 use crate::hierarchy::{LANES, NONE};
+use crate::math::Box32;
 use crate::structure::builder::Node;
+use std::ops::Range;
+
+/// A binary tree in an array.
+pub trait Binary {
+    /// Empty for a leaf.
+    fn children(&self, i: usize) -> Range<usize>;
+    fn bounds(&self, i: usize) -> Box32;
+}
+
+impl Binary for [Node] {
+    fn children(&self, i: usize) -> Range<usize> {
+        self[i].children()
+    }
+
+    fn bounds(&self, i: usize) -> Box32 {
+        self[i].bounds
+    }
+}
 
 /// Nodes of the wide tree, children side by side and after their parent.
 pub fn collapse(binary: &[Node]) -> Vec<Node> {
-    let mut wide = vec![binary[0]];
+    let mut wide = Vec::with_capacity(binary.len());
+    wide.push(binary[0]);
     // Binary node behind each wide one.
-    let mut origin = vec![0usize];
+    let mut origin = Vec::with_capacity(binary.len());
+    origin.push(0u32);
     let mut at = 0;
     while at < wide.len() {
-        let family = adopt(binary, origin[at]);
-        wide[at].first_child = if family.is_empty() { NONE } else { wide.len() as u32 };
-        wide[at].child_count = family.len() as u8;
-        for &i in &family {
-            wide.push(Node { level: wide[at].level + 1, ..binary[i] });
-        }
-        origin.extend(family);
+        let family = Family::of(binary, origin[at] as usize, LANES);
+        let members = family.members();
+        let level = wide[at].level + 1;
+        wide[at].first_child = if members.is_empty() { NONE } else { wide.len() as u32 };
+        wide[at].child_count = members.len() as u8;
+        wide.extend(members.iter().map(|i| Node { level, ..binary[*i as usize] }));
+        origin.extend(members);
         at += 1;
     }
     wide
 }
 
-/// Up to 8 descendants that together are node `i`, in the order of entries.
-fn adopt(binary: &[Node], i: usize) -> Vec<usize> {
-    let mut family: Vec<usize> = binary[i].children().collect();
-    while !family.is_empty() && family.len() < LANES {
-        let area = |i: &usize| binary[*i].bounds.half_area();
-        let inner = (0..family.len()).filter(|k| !binary[family[*k]].is_leaf());
-        // The first of equals, so that the tree depends on the boxes alone.
-        let Some(largest) = inner.rev().max_by(|a, b| area(&family[*a]).total_cmp(&area(&family[*b]))) else { break };
-        family.splice(largest..=largest, binary[family[largest]].children());
-    }
-    family
+/// Up to `width` descendants that together are one node, in the order of entries.
+pub struct Family {
+    members: [u32; LANES],
+    /// Surface of each; below every other for a leaf, which has no children to adopt.
+    areas: [f32; LANES],
+    count: usize,
 }
+
+impl Family {
+    /// # Panics
+    /// If a node has more children than are left to adopt: the tree is not binary.
+    pub fn of<T: Binary + ?Sized>(tree: &T, i: usize, width: usize) -> Family {
+        let mut family = Family { members: [0; LANES], areas: [0.0; LANES], count: 0 };
+        family.replace(tree, 0, 0, tree.children(i));
+        while family.count > 0 && family.count < width {
+            // The first of equals, so that the tree depends on the boxes alone.
+            let mut largest = 0;
+            for k in 1..family.count {
+                if family.areas[k].total_cmp(&family.areas[largest]).is_gt() {
+                    largest = k;
+                }
+            }
+            if family.areas[largest].total_cmp(&LEAF_AREA).is_eq() {
+                break;
+            }
+            family.replace(tree, largest, 1, tree.children(family.members[largest] as usize));
+        }
+        family
+    }
+
+    pub fn members(&self) -> &[u32] {
+        &self.members[..self.count]
+    }
+
+    /// Puts `children` where `gone` members were, from `at` on.
+    fn replace<T: Binary + ?Sized>(&mut self, tree: &T, at: usize, gone: usize, children: Range<usize>) {
+        let added = children.len();
+        self.members.copy_within(at + gone..self.count, at + added);
+        self.areas.copy_within(at + gone..self.count, at + added);
+        for (k, child) in (at..).zip(children) {
+            self.members[k] = child as u32;
+            self.areas[k] = if tree.children(child).is_empty() { LEAF_AREA } else { tree.bounds(child).half_area() };
+        }
+        self.count = self.count + added - gone;
+    }
+}
+
+/// Below every area in the total order.
+const LEAF_AREA: f32 = f32::from_bits(u32::MAX);
 
 #[cfg(test)]
 mod tests {
@@ -43,7 +101,7 @@ mod tests {
 
     #[test]
     fn a_full_binary_tree_of_three_levels_becomes_one_group_of_eight() {
-        let unit = crate::math::Box32 { lo: crate::math::Vec3::ZERO, hi: crate::math::Vec3::ONE };
+        let unit = Box32 { lo: crate::math::Vec3::ZERO, hi: crate::math::Vec3::ONE };
         let mut binary: Vec<Node> = (0..15).map(|i| Node { bounds: unit, ..Node::new(i, i + 1, 0) }).collect();
         for (i, node) in binary.iter_mut().enumerate().take(7) {
             node.first_child = 2 * i as u32 + 1;

@@ -137,6 +137,10 @@ pub fn flatten_forest(
     h.root_blocks = roots.div_ceil(LANES) as u32;
     let with_planes = nodes.iter().any(|n| n.half_space.is_some());
     let mut planes = Vec::new();
+    let blocks = h.root_blocks as usize + nodes.iter().filter(|n| !n.is_leaf()).count();
+    h.bounds.reserve_exact(blocks);
+    h.links.reserve_exact(blocks);
+    h.parent.reserve_exact(blocks);
     let groups: Vec<_> = (0..roots).step_by(LANES).map(|i| i..(i + LANES).min(roots)).collect();
     let mut write = |group: std::ops::Range<usize>, parent: u32, pending: &mut Vec<(std::ops::Range<usize>, u32)>| {
         let block = h.links.len();

@@ -33,6 +33,7 @@ fn structures() -> Vec<String> {
         "kd_tree:leaf_size=24,policy=S,layout=binary",
     ];
     all.extend(cells.map(String::from));
+    all.extend(["bvh:leaf_size=16".to_string(), "bvh:split=morton,leaf_size=24,layout=binary".into()]);
     all
 }
 

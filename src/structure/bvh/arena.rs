@@ -1,0 +1,95 @@
+//! Large working arrays on huge pages, where the system gives them when asked: a build
+//! writes each array once from end to end, and most of the cost of fresh memory is the
+//! fault for every 4 KiB of it.
+
+use super::record::Record;
+use std::ops::{Deref, DerefMut};
+
+/// An array of records, all zero at first.
+pub struct Arena {
+    #[cfg(target_os = "linux")]
+    start: std::ptr::NonNull<Record>,
+    #[cfg(not(target_os = "linux"))]
+    records: Vec<Record>,
+    #[cfg(target_os = "linux")]
+    len: usize,
+}
+
+#[cfg(target_os = "linux")]
+mod linux {
+    use super::*;
+
+    /// Below this a mapping of its own costs more than it saves.
+    const SMALLEST_BYTES: usize = 64;
+
+    // SAFETY: an arena owns its memory as a `Vec` does.
+    unsafe impl Send for Arena {}
+    // SAFETY: as above.
+    unsafe impl Sync for Arena {}
+
+    impl Arena {
+        /// # Panics
+        /// If the system has no memory left.
+        pub fn zeroed(len: usize) -> Arena {
+            let bytes = Self::bytes(len);
+            // SAFETY: a fresh private mapping touches no other memory.
+            let start = unsafe {
+                let (access, kind) = (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_PRIVATE | libc::MAP_ANONYMOUS);
+                libc::mmap(std::ptr::null_mut(), bytes, access, kind, -1, 0)
+            };
+            assert!(start != libc::MAP_FAILED, "no memory for {len} records");
+            // SAFETY: the mapping just made; advice may be refused and changes no content.
+            unsafe { libc::madvise(start, bytes, libc::MADV_HUGEPAGE) };
+            let start = std::ptr::NonNull::new(start.cast()).expect("a mapping is not at address 0");
+            Arena { start, len }
+        }
+
+        fn bytes(len: usize) -> usize {
+            (len * size_of::<Record>()).max(SMALLEST_BYTES)
+        }
+    }
+
+    impl Drop for Arena {
+        fn drop(&mut self) {
+            // SAFETY: the mapping made in `zeroed`, which nothing outlives.
+            unsafe { libc::munmap(self.start.as_ptr().cast(), Self::bytes(self.len)) };
+        }
+    }
+
+    impl Deref for Arena {
+        type Target = [Record];
+        fn deref(&self) -> &[Record] {
+            // SAFETY: mapped, page-aligned, and zeros are a record.
+            unsafe { std::slice::from_raw_parts(self.start.as_ptr(), self.len) }
+        }
+    }
+
+    impl DerefMut for Arena {
+        fn deref_mut(&mut self) -> &mut [Record] {
+            // SAFETY: as above, and borrowed mutably.
+            unsafe { std::slice::from_raw_parts_mut(self.start.as_ptr(), self.len) }
+        }
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+impl Arena {
+    pub fn zeroed(len: usize) -> Arena {
+        Arena { records: vec![Record([0.0; 8]); len] }
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+impl Deref for Arena {
+    type Target = [Record];
+    fn deref(&self) -> &[Record] {
+        &self.records
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+impl DerefMut for Arena {
+    fn deref_mut(&mut self) -> &mut [Record] {
+        &mut self.records
+    }
+}
