@@ -4,8 +4,11 @@
 //! "non-uniform grids". This is our reading: planes across each axis, chosen
 //! - `quantile`: at quantiles of the centroids, so that every layer of cells holds as
 //!   many triangles as any other, to one;
-//! - `walls`: where most area of triangles lies in one plane across the axis, walls
-//!   and floors, heaviest first; quantiles of what is left make up the number.
+//! - `walls`: at those quantiles, each moved to the wall or floor of its neighbourhood
+//!   with most area, if there is one: where triangles lie in one plane across the axis
+//!   with all their corners. (The heaviest walls of the whole axis lie close together,
+//!   or anywhere in a scanned mesh: with them, one cell held 112,000 triangles of Sponza's
+//!   279,000.)
 //!
 //! Two planes of an axis are never equal, so ties and flat axes make fewer layers. A
 //! cell is found by three binary searches. Policies and layouts are those of
@@ -18,6 +21,7 @@ use super::builder::straddle::{self, Policy};
 use super::uniform_grid::{LAYOUT, build_grid};
 use crate::error::Result;
 use crate::hierarchy::Hierarchy;
+use crate::math::Aabb;
 use crate::registry::{Default, Entry, Param};
 use crate::scene::Scene;
 use rayon::prelude::*;
@@ -33,7 +37,7 @@ pub const ENTRY: Entry<dyn Structure> = Entry {
         Param {
             name: "planes",
             default: Default::Choice(&["quantile", "walls"]),
-            about: "between layers: at quantiles of the centroids, or at the heaviest walls and floors",
+            about: "between layers: at quantiles of the centroids, or moved from there to the heaviest wall or floor nearby",
         },
         straddle::PARAM,
         LAYOUT,
@@ -56,7 +60,7 @@ const fn layers(name: &'static str, value: i64, about: &'static str) -> Param {
 pub struct IrregularGrid {
     /// Layers of cells across each axis, at most.
     pub counts: [u32; 3],
-    /// Planes at walls rather than at quantiles.
+    /// Quantiles moved to walls.
     pub walls: bool,
     pub policy: Policy,
     pub rows: bool,
@@ -67,11 +71,12 @@ impl IrregularGrid {
     pub fn grid(&self, scene: &Scene) -> Grid {
         let bounds = scene_bounds(scene);
         let axis = |axis: usize| {
-            let count = self.counts[axis] as usize;
-            let (lo, hi) = (bounds.lo[axis], bounds.hi[axis]);
-            let mut planes = if self.walls { heaviest_walls(scene, axis, lo, hi, count - 1) } else { Vec::new() };
-            planes.extend(quantiles(scene, axis, count - planes.len()));
-            Axis::between(lo, hi, planes)
+            let ranks = layer_ranks(scene.len(), self.counts[axis] as usize);
+            let planes = match self.walls {
+                true => snapped(scene, axis, &bounds, &ranks),
+                false => planes_at(centroids(scene, axis), &ranks),
+            };
+            Axis::between(bounds.lo[axis], bounds.hi[axis], planes)
         };
         let axes: Vec<Axis> = (0..3).into_par_iter().map(axis).collect();
         Grid { axes: axes.try_into().expect("three axes"), morton: false }
@@ -85,18 +90,26 @@ impl Structure for IrregularGrid {
     }
 }
 
-/// Planes that part the centroids into `parts` of one size, to one, unless they tie.
-fn quantiles(scene: &Scene, axis: usize, parts: usize) -> Vec<f64> {
-    let n = scene.len();
-    let mut ranks: Vec<usize> = (1..parts).map(|i| i * n / parts).filter(|rank| *rank > 0).collect();
-    ranks.dedup();
+/// Coordinates of all centroids, in the order of triangles.
+fn centroids(scene: &Scene, axis: usize) -> Vec<f64> {
     let centroid = |t| {
         let [a, b, c] = scene.corners(t);
         (a[axis] + b[axis] + c[axis]) / 3.0
     };
-    let mut values: Vec<f64> = (0..n as u32).into_par_iter().with_min_len(4096).map(centroid).collect();
+    (0..scene.len() as u32).into_par_iter().with_min_len(4096).map(centroid).collect()
+}
+
+/// Ranks of the first centroid of every layer but the lowest, ascending.
+fn layer_ranks(n: usize, layers: usize) -> Vec<usize> {
+    let mut ranks: Vec<usize> = (1..layers).map(|i| i * n / layers).filter(|rank| *rank > 0).collect();
+    ranks.dedup();
+    ranks
+}
+
+/// A plane below the centroid of each rank and above the one before, where they do not tie.
+fn planes_at(mut centroids: Vec<f64>, ranks: &[usize]) -> Vec<f64> {
     let mut planes = vec![0.0; ranks.len()];
-    part(&mut values, 0, &ranks, &mut planes);
+    part(&mut centroids, 0, ranks, &mut planes);
     planes
 }
 
@@ -123,21 +136,39 @@ fn part(values: &mut [f64], base: usize, ranks: &[usize], planes: &mut [f64]) {
     );
 }
 
-/// Coordinates strictly between `lo` and `hi` in which most area lies across the
-/// axis, at most `count`: of triangles whose three corners share it to the bit.
-fn heaviest_walls(scene: &Scene, axis: usize, lo: f64, hi: f64, count: usize) -> Vec<f64> {
+/// The planes at the quantiles, each moved to the heaviest wall of its neighbourhood,
+/// which ends halfway by rank to the planes beside it.
+fn snapped(scene: &Scene, axis: usize, bounds: &Aabb, ranks: &[usize]) -> Vec<f64> {
+    let borders: Vec<usize> = ranks.windows(2).map(|w| (w[0] + w[1]).div_ceil(2)).collect();
+    let mut all = [ranks, &borders].concat();
+    all.sort_unstable();
+    all.dedup();
+    let found = planes_at(centroids(scene, axis), &all);
+    let plane = |rank: &usize| found[all.partition_point(|r| r < rank)];
+    let borders: Vec<f64> = borders.iter().map(plane).collect();
+    // Heaviest wall so far, and the plane without one.
+    let mut planes: Vec<(f64, f64)> = ranks.iter().map(|rank| (0.0, plane(rank))).collect();
+    for (at, area) in walls(scene, axis, bounds) {
+        if let Some(plane) = planes.get_mut(borders.partition_point(|b| *b <= at))
+            && area > plane.0
+        {
+            *plane = (area, at);
+        }
+    }
+    planes.into_iter().map(|(_, at)| at).collect()
+}
+
+/// Coordinates inside the bounds in which triangles lie across the axis, all three
+/// corners to the bit, with twice the area there; ascending.
+fn walls(scene: &Scene, axis: usize, bounds: &Aabb) -> Vec<(f64, f64)> {
+    let (lo, hi) = (bounds.lo[axis], bounds.hi[axis]);
     let in_plane = |t: u32| {
         let [a, b, c] = scene.corners(t).map(|p| p[axis]);
-        let area = scene.normal(t).length();
-        (a == b && b == c && lo < a && a < hi && area > 0.0).then_some((a, area))
+        (a == b && b == c && lo < a && a < hi).then(|| (a, scene.normal(t).length()))
     };
     let mut found: Vec<(f64, f64)> =
         (0..scene.len() as u32).into_par_iter().with_min_len(4096).filter_map(in_plane).collect();
     // Stable: areas are added in the order of the scene.
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut walls: Vec<(f64, f64)> =
-        found.chunk_by(|a, b| a.0 == b.0).map(|wall| (wall[0].0, wall.iter().map(|w| w.1).sum())).collect();
-    walls.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
-    walls.truncate(count);
-    walls.into_iter().map(|w| w.0).collect()
+    found.chunk_by(|a, b| a.0 == b.0).map(|wall| (wall[0].0, wall.iter().map(|w| w.1).sum())).collect()
 }

@@ -304,4 +304,8 @@ fn unknown_and_impossible_parameters_are_named() {
     let e = made.build(&scene).unwrap_err();
     assert!(e.key.as_deref() == Some("leaves") && e.to_string().contains("policy \"L\""), "{e}");
     assert!(error("list:leaf_size=0").contains("from 1 to"));
+    assert!(error("uniform_grid:density=0").contains("from 0.01 to"));
+    assert!(error("nested_grid:levels=5").contains("from 1 to 4"));
+    assert!(error("irregular_grid:planes=wall").contains("did you mean \"walls\"?"));
+    assert!(error("kd_tree:split=sa").contains("\"sah\", \"median\""));
 }
