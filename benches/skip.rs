@@ -40,12 +40,18 @@ struct Frame {
     tally: [f64; 14],
     triangles: f64,
     calls: f64,
+    /// Draw calls if all triangles had one material.
+    ranges: f64,
 }
 
 impl Frame {
     fn modelled_ns(&self) -> f64 {
         let model = TimeModel::default();
         self.cull_ns + model.index_ns * 3.0 * self.triangles + model.draw_call_ns * self.calls
+    }
+
+    fn one_material_ns(&self) -> f64 {
+        Frame { calls: self.ranges, ..*self }.modelled_ns()
     }
 
     fn count(&self, name: &str) -> f64 {
@@ -103,11 +109,12 @@ fn run(scene: &Scene, methods: &[Name], views: &[View]) -> Vec<Frame> {
     }
     let counted = |method: &mut Method, ns: &mut Vec<f64>| {
         ns.sort_by(f64::total_cmp);
-        let mut frame = Frame { cull_ns: ns[ns.len() / 2], tally: [0.0; 14], triangles: 0.0, calls: 0.0 };
+        let mut frame = Frame { cull_ns: ns[ns.len() / 2], tally: [0.0; 14], triangles: 0.0, calls: 0.0, ranges: 0.0 };
         let (share, h) = (1.0 / views.len() as f64, method.hierarchy);
         method.pass(views, |out, tally| {
             frame.triangles += out.entry_count() as f64 * share;
             frame.calls += out.draw_calls(h) as f64 * share;
+            frame.ranges += out.draw_calls_any_material() as f64 * share;
             frame.tally.iter_mut().zip(tally.named()).for_each(|(sum, (.., value))| *sum += value as f64 * share);
         });
         frame
@@ -169,50 +176,69 @@ fn whole(views: &[View]) {
         ),
     ];
     for (culled, all) in pairs {
-        println!("{} x frustum", culled.0);
+        println!("{} x frustum; modelled us by materials and as if there were one", culled.0);
         println!(
-            "{:>9} {:>9} {:>9} {:>7} {:>11} {:>9} {:>7} {:>11} {:>6}",
-            "triangles", "cull ns", "kept", "calls", "modelled us", "whole ns", "calls", "modelled us", "wins"
+            "{:>9} {:>8} {:>8} {:>7} {:>7} {:>9} {:>9} {:>8} {:>7} {:>9} {:>9} {:>6} {:>6}",
+            "triangles",
+            "cull ns",
+            "kept",
+            "calls",
+            "ranges",
+            "us",
+            "us of one",
+            "whole ns",
+            "calls",
+            "us",
+            "us of one",
+            "wins",
+            "of one"
         );
-        let mut largest = 0;
+        let mut largest = [0; 2];
         for n in sizes {
-            let frames = run(&blocks(n), &[culled, all], views);
-            let wins = frames[1].modelled_ns() <= frames[0].modelled_ns();
-            largest = if wins { n } else { largest };
+            let [part, whole] = run(&blocks(n), &[culled, all], views)[..] else { unreachable!("two methods") };
+            let wins = [whole.modelled_ns() <= part.modelled_ns(), whole.one_material_ns() <= part.one_material_ns()];
+            largest = [0, 1].map(|i| if wins[i] { n } else { largest[i] });
+            let [by_materials, of_one] = wins.map(|w| if w { "whole" } else { "cull" });
             println!(
-                "{n:>9} {:>9.0} {:>9.0} {:>7.1} {:>11.2} {:>9.1} {:>7.1} {:>11.2} {:>6}",
-                frames[0].cull_ns,
-                frames[0].triangles,
-                frames[0].calls,
-                frames[0].modelled_ns() / 1e3,
-                frames[1].cull_ns,
-                frames[1].calls,
-                frames[1].modelled_ns() / 1e3,
-                if wins { "whole" } else { "cull" }
+                "{n:>9} {:>8.0} {:>8.0} {:>7.1} {:>7.1} {:>9.2} {:>9.2} {:>8.1} {:>7.1} {:>9.2} {:>9.2} {by_materials:>6} {of_one:>6}",
+                part.cull_ns,
+                part.triangles,
+                part.calls,
+                part.ranges,
+                part.modelled_ns() / 1e3,
+                part.one_material_ns() / 1e3,
+                whole.cull_ns,
+                whole.calls,
+                whole.modelled_ns() / 1e3,
+                whole.one_material_ns() / 1e3,
             );
         }
-        println!("drawing whole wins up to {largest} triangles");
+        println!("drawing whole wins up to {} triangles, and up to {} of one material", largest[0], largest[1]);
     }
 }
 
 /// One line a method, with what it gains over the first.
 fn table(scene: &Scene, methods: &[Name], views: &[View], counter: &str, label: impl Fn(&Name) -> String) {
     println!(
-        "{:<44} {:>9} {:>8} {:>9} {:>9} {:>7} {:>11} {:>7}",
-        "", "cull us", "nodes", counter, "triangles", "calls", "modelled us", "gain"
+        "{:<46} {:>8} {:>6} {:>9} {:>9} {:>7} {:>7} {:>9} {:>7} {:>9} {:>7}",
+        "", "cull us", "nodes", "skipped", "triangles", "calls", "ranges", "us", "gain", "us of one", "gain"
     );
     let frames = run(scene, methods, views);
+    let gain = |of: fn(&Frame) -> f64, frame: &Frame| (1.0 - of(frame) / of(&frames[0])) * 100.0;
     for (name, frame) in methods.iter().zip(&frames) {
         println!(
-            "{:<44} {:>9.2} {:>8.0} {:>9.0} {:>9.0} {:>7.1} {:>11.2} {:>6.1}%",
+            "{:<46} {:>8.2} {:>6.0} {:>9.0} {:>9.0} {:>7.1} {:>7.1} {:>9.2} {:>6.1}% {:>9.2} {:>6.1}%",
             label(name),
             frame.cull_ns / 1e3,
             frame.count("nodes_visited"),
             frame.count(counter),
             frame.triangles,
             frame.calls,
+            frame.ranges,
             frame.modelled_ns() / 1e3,
-            (1.0 - frame.modelled_ns() / frames[0].modelled_ns()) * 100.0
+            gain(Frame::modelled_ns, frame),
+            frame.one_material_ns() / 1e3,
+            gain(Frame::one_material_ns, frame)
         );
     }
 }

@@ -83,8 +83,8 @@ pub const ENTRY: Entry<dyn Test> = Entry {
             sat: spec.bool("sat"),
         };
         match spec.text(PRIMITIVE) {
-            "sphere" => return Box::new(Frustum::new(options, Spheres::new(sphere::kernels()[0].1))),
-            "point" => return Box::new(Frustum::new(options, Points::new(sphere::kernels()[0].1))),
+            "sphere" => return Box::new(Frustum::new(options, Spheres::new(sphere::kernels()[0]))),
+            "point" => return Box::new(Frustum::new(options, Points::new(sphere::kernels()[0]))),
             _ => {}
         }
         match arithmetic_of(spec) {
@@ -185,7 +185,7 @@ impl<P: PlaneTest> Frustum<P> {
     }
 
     /// Lanes that no plane rejects, in index order.
-    #[inline]
+    #[inline(always)]
     fn in_order(&mut self, h: &Hierarchy, ask: Ask, far: &Far, masks: &mut PlaneMasks, tally: &mut Tally) -> u8 {
         self.boxes.block(h, &ask, masks, tally);
         let mut alive = ask.lanes;
@@ -198,7 +198,7 @@ impl<P: PlaneTest> Frustum<P> {
     }
 
     /// The same, each lane starting with the plane that rejected it last.
-    #[inline]
+    #[inline(always)]
     fn last_first(&mut self, h: &Hierarchy, ask: Ask, far: &Far, masks: &mut PlaneMasks, tally: &mut Tally) -> u8 {
         let last = &mut self.last[ask.block as usize];
         let mut alive = ask.lanes;
@@ -226,6 +226,26 @@ impl<P: PlaneTest> Frustum<P> {
                 last.iter_mut().for_each(|l| *l &= !rejected);
                 last[k] |= rejected;
             }
+        }
+        alive
+    }
+
+    /// The same without the planes that the octant test leaves out.
+    #[inline(never)]
+    fn by_octant(&mut self, h: &Hierarchy, ask: Ask, masks: &mut PlaneMasks, tally: &mut Tally) -> u8 {
+        let mut far = Far::NONE;
+        if let Some(known) = self.boxes.far_planes(&self.halves, h, ask.block) {
+            tally.octant_tests += u64::from(ask.lanes.count_ones());
+            far = known;
+        }
+        let needed = Ask { planes: far.needed(ask.planes, ask.lanes), ..ask };
+        let alive = if self.options.last_plane {
+            self.last_first(h, needed, &far, masks, tally)
+        } else {
+            self.in_order(h, needed, &far, masks, tally)
+        };
+        if ask.inside && alive != 0 {
+            self.inside_of_far(h, ask, &far, alive, masks, tally);
         }
         alive
     }
@@ -318,25 +338,13 @@ impl<P: PlaneTest> Test for Frustum<P> {
         if self.with_boxes {
             let mut masks = PlaneMasks::default();
             // Nobody inherits what a block of leaves is inside of.
-            let inherited = hierarchy.links[block as usize].child.iter().any(|c| *c != NONE);
-            let inside = inherited || self.options.sat;
-            let mut ask = Ask { block, lanes: live, planes: carry, inside, until_rejected: true };
-            let mut far = Far::NONE;
-            if self.options.octant
-                && let Some(known) = self.boxes.far_planes(&self.halves, hierarchy, block)
-            {
-                tally.octant_tests += u64::from(live.count_ones());
-                far = known;
-                ask.planes = far.needed(carry, live);
-            }
-            alive = if self.options.last_plane {
-                self.last_first(hierarchy, ask, &far, &mut masks, tally)
-            } else {
-                self.in_order(hierarchy, ask, &far, &mut masks, tally)
+            let inside = hierarchy.links[block as usize].child.iter().any(|c| *c != NONE) || self.options.sat;
+            let ask = Ask { block, lanes: live, planes: carry, inside, until_rejected: true };
+            alive = match self.options {
+                Options { octant: true, .. } => self.by_octant(hierarchy, ask, &mut masks, tally),
+                Options { last_plane: true, .. } => self.last_first(hierarchy, ask, &Far::NONE, &mut masks, tally),
+                _ => self.in_order(hierarchy, ask, &Far::NONE, &mut masks, tally),
             };
-            if inside && self.options.octant && alive != 0 {
-                self.inside_of_far(hierarchy, Ask { planes: carry, ..ask }, &far, alive, &mut masks, tally);
-            }
             carries = planes_left(&masks, carry, self.options.plane_mask);
             if self.options.sat {
                 let open = bits(alive).filter(|l| carries[*l] != 0).fold(0, |m, l| m | 1 << l);

@@ -31,7 +31,7 @@ use super::frustum_planes::{GUARD, MAX_PLANES, down, split_eye, up};
 use crate::hierarchy::{BoundsBlock, LANES};
 use crate::math::{DVec3, View};
 
-type Row = [f32; LANES];
+pub(super) type Row = [f32; LANES];
 
 /// What needs no comparison: bit per lane, an entry a plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -56,19 +56,22 @@ impl Far {
 /// The view as the octant test reads it, in twice the coordinates of the camera.
 #[derive(Debug, Clone, Default)]
 pub struct Halves {
-    eye: [f32; 3],
+    pub(super) eye: [f32; 3],
     /// To the right, up, forward.
-    axes: [[f32; 3]; 3],
-    offset: [f32; 3],
-    slack: f32,
-    perspective: bool,
+    pub(super) axes: [[f32; 3]; 3],
+    pub(super) offset: [f32; 3],
+    pub(super) slack: f32,
+    pub(super) perspective: bool,
     /// Left and right, bottom and top: the inward normal's parts, across and forward.
-    side: [[f32; 2]; 2],
+    pub(super) side: [[f32; 2]; 2],
     /// Orthographic: twice the half extents of the window, rounded down.
-    window: [f32; 2],
-    near: f32,
-    far: Option<f32>,
+    pub(super) window: [f32; 2],
+    pub(super) near: f32,
+    pub(super) far: Option<f32>,
 }
+
+/// Addend to a diagonal: more than what squares that underflow can hide.
+pub(super) const TINY: f32 = 1e-18;
 
 impl Halves {
     pub fn new(view: &View, origin: DVec3) -> Halves {
@@ -91,8 +94,18 @@ impl Halves {
         }
     }
 
-    /// Of 8 boxes by their centres.
+    /// Of 8 boxes by their centres, with the widest instructions there are.
+    #[inline]
     pub fn of_boxes(&self, bounds: &BoundsBlock) -> Far {
+        #[cfg(target_arch = "x86_64")]
+        if super::frustum_x86::has_avx2() {
+            return super::frustum_octant_x86::of_boxes_avx2(self, bounds);
+        }
+        self.of_boxes_plainly(bounds)
+    }
+
+    /// The twin of the vector kernels.
+    pub fn of_boxes_plainly(&self, bounds: &BoundsBlock) -> Far {
         let (mut twice, mut size, mut across) = ([[0.0; LANES]; 3], [0.0; LANES], [0.0; LANES]);
         let mut sound = [true; LANES];
         for (axis, twice) in twice.iter_mut().enumerate() {
@@ -106,8 +119,8 @@ impl Halves {
                 size[lane] += lo.abs() + hi.abs();
             }
         }
-        // Twice the radius, rounded up; the addend is what squares that underflow can hide.
-        let diagonal = across.map(|d| d.sqrt() * (1.0 + GUARD) + 1e-18);
+        // Twice the radius, rounded up.
+        let diagonal = across.map(|d| d.sqrt() * (1.0 + GUARD) + TINY);
         let lanes = (0..LANES).fold(0, |m, l| m | u8::from(sound[l]) << l);
         self.judge(&twice, &size, &diagonal, lanes)
     }

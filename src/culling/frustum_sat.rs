@@ -96,6 +96,7 @@ impl SeparatingAxes {
     }
 
     /// The lanes of `lanes` that some axis separates from the view.
+    #[inline(never)]
     pub fn separated(&self, bounds: &BoundsBlock, lanes: u8, tally: &mut Tally) -> u8 {
         let apart = |lane: usize, tally: &mut Tally| self.separates(&bounds.get(lane), tally);
         (0..LANES).filter(|l| lanes >> l & 1 == 1).fold(0, |m, l| m | u8::from(apart(l, tally)) << l)

@@ -24,7 +24,7 @@
 
 use super::frustum_arithmetic::{Ask, PlaneTest, bits};
 use super::frustum_octant::{Far, Halves};
-use super::frustum_planes::{FramePlanes, GUARD, PlaneMasks};
+use super::frustum_planes::{FramePlanes, GUARD, PlaneMasks, Work};
 use super::{Class, Tally};
 use crate::hierarchy::{BoundsBlock, Hierarchy, LANES};
 use crate::math::{Box32, View};
@@ -64,22 +64,51 @@ fn sphere(b: &Box32) -> ([f32; 3], f32) {
     (centre.to_array(), if f64::from(radius) < reach { radius.next_up() } else { radius })
 }
 
-/// Kernel of one instruction set: the planes of the mask; whether inside, if told so.
-pub type SphereKernel = fn(&FramePlanes, &SphereBlock, u8, bool, &mut PlaneMasks);
+type BlockKernel = fn(&FramePlanes, &SphereBlock, u8, bool, &mut PlaneMasks);
+type FlatKernel = fn(&FramePlanes, &[SphereBlock], &[u8], &mut [u8]) -> Work;
 
-/// The twin of the vector kernels.
+/// One instruction set's pair of kernels; all give the same bits.
+#[derive(Debug, Clone, Copy)]
+pub struct SphereKernels {
+    pub name: &'static str,
+    pub block: BlockKernel,
+    pub flat: FlatKernel,
+}
+
+/// What this processor can run, the widest first, the scalar twin last.
+pub fn kernels() -> Vec<SphereKernels> {
+    let mut found = Vec::new();
+    #[cfg(target_arch = "x86_64")]
+    if super::frustum_x86::has_avx2() {
+        use super::frustum_sphere_x86 as x86;
+        found.push(SphereKernels { name: "avx2", block: x86::block_avx2, flat: x86::flat_avx2 });
+    }
+    found.push(SphereKernels { name: "scalar", block, flat });
+    found
+}
+
+/// Middle of a lane's sphere relative to the eye, and what its distance is compared with.
+#[inline]
+fn relative(frame: &FramePlanes, spheres: &SphereBlock, lane: usize) -> ([f32; 3], f32) {
+    let [x, y, z] = [0, 1, 2].map(|axis| spheres.centre[axis][lane] - frame.eye[axis]);
+    ([x, y, z], ((x.abs() + y.abs()) + z.abs()) * GUARD + spheres.radius_m[lane])
+}
+
+#[inline]
+fn value(normal: &[f32; 3], [x, y, z]: [f32; 3], d: f32) -> f32 {
+    normal[2].mul_add(z, normal[1].mul_add(y, normal[0].mul_add(x, d)))
+}
+
+/// Judges 8 spheres; see `frustum_scalar::block`.
 pub fn block(frame: &FramePlanes, spheres: &SphereBlock, wanted: u8, want_inside: bool, out: &mut PlaneMasks) {
     for k in bits(wanted & frame.all()) {
         let plane = &frame.planes[k];
-        let [nx, ny, nz] = plane.normal;
         let (mut outside, mut inside) = (0, 0);
         for lane in 0..LANES {
-            let [x, y, z] = [0, 1, 2].map(|axis| spheres.centre[axis][lane] - frame.eye[axis]);
-            let bound = ((x.abs() + y.abs()) + z.abs()) * GUARD + spheres.radius_m[lane];
-            let value = |d: f32| nz.mul_add(z, ny.mul_add(y, nx.mul_add(x, d)));
-            outside |= u8::from(value(plane.d_out) < -bound) << lane;
+            let (a, bound) = relative(frame, spheres, lane);
+            outside |= u8::from(value(&plane.normal, a, plane.d_out) < -bound) << lane;
             if want_inside {
-                inside |= u8::from(value(plane.d_in) > bound) << lane;
+                inside |= u8::from(value(&plane.normal, a, plane.d_in) > bound) << lane;
             }
         }
         out.outside[k] = outside;
@@ -89,27 +118,37 @@ pub fn block(frame: &FramePlanes, spheres: &SphereBlock, wanted: u8, want_inside
     }
 }
 
-/// What this processor can run, the widest first, the scalar twin last.
-pub fn kernels() -> Vec<(&'static str, SphereKernel)> {
-    let mut found: Vec<(&'static str, SphereKernel)> = Vec::new();
-    #[cfg(target_arch = "x86_64")]
-    if super::frustum_x86::has_avx2() {
-        found.push(("avx2", super::frustum_sphere_x86::block_avx2));
+/// Judges the spheres of many blocks; see `frustum_scalar::flat`.
+pub fn flat(frame: &FramePlanes, spheres: &[SphereBlock], live: &[u8], outside: &mut [u8]) -> Work {
+    let mut work = Work::default();
+    for ((spheres, live), out) in spheres.iter().zip(live).zip(outside) {
+        let mut left = live & !*out;
+        work.lanes += u64::from(left.count_ones());
+        for lane in bits(left) {
+            let (a, bound) = relative(frame, spheres, lane);
+            for plane in &frame.planes[..frame.count] {
+                work.planes += 1;
+                if value(&plane.normal, a, plane.d_out) < -bound {
+                    left &= !(1 << lane);
+                    break;
+                }
+            }
+        }
+        *out = !left;
     }
-    found.push(("scalar", block));
-    found
+    work
 }
 
 /// The column and the planes of the frame.
 struct Column {
-    kernel: SphereKernel,
+    kernels: SphereKernels,
     frame: FramePlanes,
     spheres: Vec<SphereBlock>,
 }
 
 impl Column {
-    fn new(kernel: SphereKernel) -> Column {
-        Column { kernel, frame: FramePlanes::default(), spheres: Vec::new() }
+    fn new(kernels: SphereKernels) -> Column {
+        Column { kernels, frame: FramePlanes::default(), spheres: Vec::new() }
     }
 
     fn prepare(&mut self, hierarchy: &Hierarchy, points: bool) -> usize {
@@ -119,7 +158,11 @@ impl Column {
 
     #[inline]
     fn judge(&self, ask: &Ask, inside: bool, masks: &mut PlaneMasks) {
-        (self.kernel)(&self.frame, &self.spheres[ask.block as usize], ask.planes, inside, masks);
+        (self.kernels.block)(&self.frame, &self.spheres[ask.block as usize], ask.planes, inside, masks);
+    }
+
+    fn flat(&self, live: &[u8], outside: &mut [u8]) -> Work {
+        (self.kernels.flat)(&self.frame, &self.spheres[..outside.len()], live, outside)
     }
 }
 
@@ -127,8 +170,8 @@ impl Column {
 pub struct Spheres(Column);
 
 impl Spheres {
-    pub fn new(kernel: SphereKernel) -> Spheres {
-        Spheres(Column::new(kernel))
+    pub fn new(kernels: SphereKernels) -> Spheres {
+        Spheres(Column::new(kernels))
     }
 }
 
@@ -152,14 +195,18 @@ impl PlaneTest for Spheres {
     fn block(&mut self, _: &Hierarchy, ask: &Ask, masks: &mut PlaneMasks, _: &mut Tally) {
         self.0.judge(ask, ask.inside, masks);
     }
+
+    fn flat(&mut self, _: &Hierarchy, live: &[u8], outside: &mut [u8], _: &mut Tally) -> Work {
+        self.0.flat(live, outside)
+    }
 }
 
 /// `primitive=point`.
 pub struct Points(Column);
 
 impl Points {
-    pub fn new(kernel: SphereKernel) -> Points {
-        Points(Column::new(kernel))
+    pub fn new(kernels: SphereKernels) -> Points {
+        Points(Column::new(kernels))
     }
 }
 
@@ -182,6 +229,10 @@ impl PlaneTest for Points {
     #[inline]
     fn block(&mut self, _: &Hierarchy, ask: &Ask, masks: &mut PlaneMasks, _: &mut Tally) {
         self.0.judge(ask, false, masks);
+    }
+
+    fn flat(&mut self, _: &Hierarchy, live: &[u8], outside: &mut [u8], _: &mut Tally) -> Work {
+        self.0.flat(live, outside)
     }
 
     /// Of the very point that is judged; nothing is ever inside.

@@ -23,6 +23,8 @@ pub mod frustum_fixed;
 #[cfg(target_arch = "x86_64")]
 pub mod frustum_fixed_x86;
 pub mod frustum_octant;
+#[cfg(target_arch = "x86_64")]
+pub mod frustum_octant_x86;
 pub mod frustum_planes;
 pub mod frustum_relative;
 pub mod frustum_sat;

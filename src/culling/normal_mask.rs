@@ -276,7 +276,7 @@ impl Test for NormalMask {
         let asked = self.saturation.as_ref().map_or(live, |s| s.asked(block, live, tally));
         tally.mask_tests += u64::from(asked.count_ones());
         let mut verdict = if asked == 0 {
-            Verdict { outside: 0, carry: [0; LANES] }
+            Verdict { outside: 0, carry: [1; LANES] }
         } else if let (true, Some(local)) = (self.is_local(), &self.local) {
             let words = self.front.len();
             let masks = &self.masks[block as usize * words..][..words];

@@ -52,12 +52,12 @@ impl Saturation {
         asked
     }
 
-    /// Keeps the lanes that were not asked: to go on iff something below is.
+    /// Keeps the lanes that were not asked: to go on, if they would, iff something below is.
     pub fn keep_others(&self, block: u32, asked: u8, verdict: &mut Verdict) {
         verdict.outside &= asked;
         let below = self.below[block as usize];
         for lane in (0..LANES).filter(|l| asked >> l & 1 == 0) {
-            verdict.carry[lane] = below >> lane & 1;
+            verdict.carry[lane] &= below >> lane & 1;
         }
     }
 }

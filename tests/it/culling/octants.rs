@@ -30,6 +30,7 @@ fn what_the_octant_test_leaves_out_could_not_reject() {
         let truth = masks(Exact::default(), &h, &view, &mut none);
         for (block, truth) in truth.iter().enumerate() {
             let far = halves.of_boxes(&h.bounds[block]);
+            assert_eq!(far, halves.of_boxes_plainly(&h.bounds[block]), "the twin: {view:?} {origin}");
             let live = h.links[block].live;
             let sound = (0..8).filter(|l| finite(&h.bounds[block].get(*l))).fold(0u8, |m, l| m | 1 << l);
             for k in 0..view.planes.len() {
