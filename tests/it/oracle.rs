@@ -6,6 +6,7 @@ mod clipping;
 mod extremes;
 mod figures;
 mod files;
+#[cfg(feature = "service")]
 mod inspect;
 mod judgement;
 mod mutations;
