@@ -3,14 +3,17 @@
 //! `cargo bench --no-default-features --bench build [-- FILTER]`; a filter keeps
 //! the lines whose scene or structure contains it. Each line is the median of
 //! 5 builds with the spread of all of them: on one thread by its CPU time, which
-//! a busy machine inflates little, and on all threads by the clock. The twin is
-//! a pointer octree of the same depth and policy, built the obvious way.
+//! a busy machine inflates little, and on all threads by the clock. The twins are
+//! a pointer octree of the same depth and policy, built the obvious way, and the BVH
+//! with scalar kernels. With `CULLMARK_SCENES` the shared city is among the scenes.
 
 use cullmark::math::{Box32, DVec3};
+use cullmark::record::{SceneSource, Up, Winding};
 use cullmark::registry::Spec;
-use cullmark::scene::Scene;
+use cullmark::scene::{Scene, load};
 use cullmark::stats;
-use cullmark::structure;
+use cullmark::structure::bvh::{Bvh, Kernel};
+use cullmark::structure::{self, Structure};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -49,13 +52,14 @@ fn main() {
         |scene: &str, what: &str| filters.iter().all(|f| scene.contains(f.as_str()) || what.contains(f.as_str()));
     let all = rayon::current_num_threads();
     println!(
-        "{:<14} {:<24} {:>34} {:>34}",
+        "{:<14} {:<28} {:>34} {:>34}",
         "scene",
         "structure",
         "1 thread (CPU time), Mtri/s",
         format!("{all} threads (wall), Mtri/s")
     );
-    for scene in [soup(1_000_000), city(1_000_000), city(130_000)] {
+    let made = [soup(1_000_000), city(1_000_000), city(130_000)];
+    for scene in shared_city().into_iter().chain(made) {
         for what in STRUCTURES.iter().filter(|w| keep(&scene.name, w)) {
             // Whole scenes score in minutes: one small scene says what sampling saves.
             if what.contains("sample") && scene.len() > 200_000 {
@@ -65,10 +69,22 @@ fn main() {
             let build = || black_box(s.build(&scene).map(|h| h.entries.len()).unwrap_or(0));
             report(&scene, what, all, &build);
         }
+        if keep(&scene.name, "twin: scalar bvh") {
+            let twin = Bvh { kernel: Kernel::Scalar, ..Bvh::default() };
+            let build = || black_box(twin.build(&scene).map(|h| h.entries.len()).unwrap_or(0));
+            report(&scene, "twin: scalar bvh", all, &build);
+        }
         if keep(&scene.name, "twin: pointer octree") {
             report(&scene, "twin: pointer octree", 1, &|| black_box(Pointer::build(&scene, 4)));
         }
     }
+}
+
+/// The city of a million triangles, where `CULLMARK_SCENES` says that it is.
+fn shared_city() -> Option<Scene> {
+    let file = std::path::PathBuf::from(std::env::var_os("CULLMARK_SCENES")?).join("city_1m/city_1m.glb");
+    let spec = load::describe("city_1m", SceneSource::File(file), Winding::Ccw, Some(Up::Z), 1.0, false);
+    Some(spec.and_then(|s| load::load(&s)).unwrap_or_else(|e| panic!("{e}")))
 }
 
 fn report(scene: &Scene, what: &str, all: usize, build: &(dyn Fn() -> usize + Sync)) {
@@ -93,7 +109,7 @@ fn report(scene: &Scene, what: &str, all: usize, build: &(dyn Fn() -> usize + Sy
     }
     let duplication = entries as f64 / scene.len() as f64;
     columns.resize(2, String::new());
-    println!("{:<14} {what:<24} {:>34} {:>34}   x{duplication:.2} entries", scene.name, columns[0], columns[1]);
+    println!("{:<14} {what:<28} {:>34} {:>34}   x{duplication:.2} entries", scene.name, columns[0], columns[1]);
 }
 
 /// Seconds that this thread has run, where Linux tells (to a few milliseconds).

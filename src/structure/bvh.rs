@@ -20,6 +20,8 @@
 //! outward. The tree does not depend on threads or kernels.
 
 mod arena;
+#[cfg(target_arch = "x86_64")]
+mod best_x86;
 mod bins;
 #[cfg(target_arch = "x86_64")]
 mod bins_x86;

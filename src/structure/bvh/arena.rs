@@ -19,8 +19,8 @@ pub struct Arena {
 mod linux {
     use super::*;
 
-    /// Below this a mapping of its own costs more than it saves.
-    const SMALLEST_BYTES: usize = 64;
+    /// A mapping cannot be empty.
+    const SMALLEST_BYTES: usize = size_of::<Record>();
 
     // SAFETY: an arena owns its memory as a `Vec` does.
     unsafe impl Send for Arena {}

@@ -59,26 +59,16 @@ pub fn extent(records: &[Record]) -> (Span, [f32; 3], [f32; 3]) {
     unsafe { extent_256(records) }
 }
 
-/// See `Bins::best`.
-///
-/// # Panics
-/// If the processor lacks AVX2.
-pub fn best(all: &Bins, bins: usize) -> Option<Split> {
-    assert!(has_avx2() && bins <= BINS_MAX);
-    // SAFETY: the processor has the feature, as just asserted.
-    unsafe { best_256(all, bins) }
-}
-
 #[target_feature(enable = "avx2")]
 #[inline]
-fn load(v: &[f32; 4]) -> __m128 {
+pub fn load(v: &[f32; 4]) -> __m128 {
     // SAFETY: four f32.
     unsafe { _mm_loadu_ps(v.as_ptr()) }
 }
 
 #[target_feature(enable = "avx2")]
 #[inline]
-fn load_record(r: &Record) -> __m256 {
+pub fn load_record(r: &Record) -> __m256 {
     // SAFETY: a record is 8 f32, 32-byte aligned.
     unsafe { _mm256_load_ps(r.0.as_ptr()) }
 }
@@ -314,93 +304,4 @@ fn extent_256(records: &[Record]) -> (Span, [f32; 3], [f32; 3]) {
         [a[0], a[1], a[2]]
     };
     (out, three(lo).map(|x| -x), three(hi))
-}
-
-/// Edge lengths of a box.
-#[target_feature(enable = "avx2")]
-#[inline]
-fn edges(span: __m256) -> __m128 {
-    _mm_add_ps(_mm256_extractf128_ps::<1>(span), _mm256_castps256_ps128(span))
-}
-
-/// Half areas of eight boxes by their edge lengths.
-#[target_feature(enable = "avx2")]
-#[inline]
-fn half_areas(e: &[[f32; 4]; 8]) -> __m256 {
-    let pair = |i: usize| _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(load(&e[i])), load(&e[i + 4]));
-    let (a, b, c, d) = (pair(0), pair(1), pair(2), pair(3));
-    let (xy0, xy1) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
-    let (z0, z1) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
-    let x = _mm256_shuffle_ps::<0b01_00_01_00>(xy0, xy1);
-    let y = _mm256_shuffle_ps::<0b11_10_11_10>(xy0, xy1);
-    let z = _mm256_shuffle_ps::<0b01_00_01_00>(z0, z1);
-    let xy_yz = _mm256_add_ps(_mm256_mul_ps(x, y), _mm256_mul_ps(y, z));
-    _mm256_add_ps(xy_yz, _mm256_mul_ps(z, x))
-}
-
-#[target_feature(enable = "avx2")]
-fn best_256(all: &Bins, bins: usize) -> Option<Split> {
-    let infinite = _mm256_set1_ps(f32::INFINITY);
-    let stride = stride(bins);
-    let mut costs = [f32::INFINITY; 3 * BINS_MAX];
-    let mut least = infinite;
-    let (mut left, mut right) = ([[0f32; 4]; BINS_MAX], [[0f32; 4]; BINS_MAX]);
-    let mut before = [0u32; BINS_MAX];
-    for axis in 0..3 {
-        let spans: &[Span] = &all.spans[axis * stride..][..bins];
-        let counts: &[u32] = &all.counts[axis * stride..][..bins];
-        let mut span = load_record(&Record::EMPTY);
-        for (out, s) in right.iter_mut().zip(spans).skip(1).rev() {
-            span = _mm256_max_ps(span, load_record(s));
-            // SAFETY: four f32.
-            unsafe { _mm_storeu_ps(out.as_mut_ptr(), edges(span)) };
-        }
-        let mut span = load_record(&Record::EMPTY);
-        let mut count = 0;
-        for (i, (s, n)) in spans[..bins - 1].iter().zip(counts).enumerate() {
-            span = _mm256_max_ps(span, load_record(s));
-            count += n;
-            before[i + 1] = count;
-            // SAFETY: four f32.
-            unsafe { _mm_storeu_ps(left[i + 1].as_mut_ptr(), edges(span)) };
-        }
-        let total = count + counts[bins - 1];
-        // Past the last plane nothing is right.
-        before[bins..stride].fill(total);
-        let total = _mm256_set1_epi32(total as i32);
-        for group in (0..stride).step_by(8) {
-            // SAFETY: eight counts of an array whose length is a multiple of eight.
-            let n_left = unsafe { _mm256_loadu_si256(before[group..group + 8].as_ptr().cast()) };
-            let n_right = _mm256_sub_epi32(total, n_left);
-            let zero = _mm256_setzero_si256();
-            let one_sided = _mm256_or_si256(_mm256_cmpeq_epi32(n_left, zero), _mm256_cmpeq_epi32(n_right, zero));
-            let rows = |e: &[[f32; 4]]| half_areas(e[group..group + 8].try_into().expect("eight rows"));
-            let cost = _mm256_add_ps(
-                _mm256_mul_ps(rows(&left), _mm256_cvtepi32_ps(n_left)),
-                _mm256_mul_ps(rows(&right), _mm256_cvtepi32_ps(n_right)),
-            );
-            let cost = _mm256_blendv_ps(cost, infinite, _mm256_castsi256_ps(one_sided));
-            // Not a number is never the least.
-            least = _mm256_min_ps(cost, least);
-            // SAFETY: eight f32 of an array whose length is a multiple of eight.
-            unsafe { _mm256_storeu_ps(costs[axis * stride + group..][..8].as_mut_ptr(), cost) };
-        }
-    }
-    let low = _mm_min_ps(_mm256_castps256_ps128(least), _mm256_extractf128_ps::<1>(least));
-    let low = _mm_min_ps(low, _mm_movehl_ps(low, low));
-    let cost = _mm_cvtss_f32(_mm_min_ss(low, _mm_shuffle_ps::<1>(low, low)));
-    if cost == f32::INFINITY {
-        return None;
-    }
-    let wanted = _mm256_set1_ps(cost);
-    for group in (0..3 * stride).step_by(8) {
-        // SAFETY: eight f32 of an array whose length is a multiple of eight.
-        let costs = unsafe { _mm256_loadu_ps(costs[group..group + 8].as_ptr()) };
-        let equal = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_EQ_OQ>(costs, wanted));
-        if equal != 0 {
-            let i = group + equal.trailing_zeros() as usize;
-            return Some(Split { axis: i / stride, plane: i % stride, cost });
-        }
-    }
-    unreachable!("one of the costs is the least")
 }

@@ -112,7 +112,8 @@ impl Grow {
     /// Grows large nodes here and their subtrees in tasks.
     fn plant(&self, mut job: Job, bins: &Bins, scratch: &mut Scratch) -> Tree {
         if job.here.len() <= TASK || rayon::current_num_threads() == 1 {
-            let mut out = vec![Slim::UNBORN];
+            let mut out = Vec::with_capacity(self.likely_nodes(job.here.len()));
+            out.push(Slim::UNBORN);
             self.grow(job, bins, scratch, &mut out, 0);
             return Tree::Part(out);
         }
@@ -125,6 +126,13 @@ impl Grow {
         let (left, right) =
             rayon::join(|| self.plant(left, &pair[0], scratch), || self.plant(right, &pair[1], &mut Scratch::new()));
         Tree::Fork(bounds, Box::new([left, right]))
+    }
+
+    /// Room for the nodes over so many records: growing the array copies it, and room
+    /// that is not used costs nothing.
+    fn likely_nodes(&self, records: usize) -> usize {
+        let leaf = if self.by_cost { 2 } else { self.leaf_size.div_ceil(2) };
+        2 * records.div_ceil(leaf)
     }
 
     fn grow(&self, mut job: Job, bins: &Bins, scratch: &mut Scratch, out: &mut Vec<Slim>, slot: usize) {
@@ -164,7 +172,7 @@ impl Grow {
             from = &scratch.own;
             split = self.kernel.best(from, job.bins);
         }
-        let cost = split.map_or(0.0, |s| s.cost);
+        let cost = split.map_or(f32::INFINITY, |s| s.cost);
         if n <= self.leaf_size && !pays(job, cost) {
             return None;
         }
@@ -265,7 +273,7 @@ impl Grow {
         if job.bounds == Record::EMPTY {
             job.bounds = self.kernel.extent(job.here).0;
         }
-        if job.here.len() <= self.leaf_size && !pays(job, best.map_or(0.0, |c| c.cost)) {
+        if job.here.len() <= self.leaf_size && !pays(job, best.map_or(f32::INFINITY, |c| c.cost)) {
             return None;
         }
         let Some(cut) = best.filter(|c| c.cost > 0.0) else { return Some(self.halve(job)) };

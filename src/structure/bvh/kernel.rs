@@ -1,11 +1,11 @@
 //! Which kernels a build uses: the fastest that the processor has, or the scalar twins.
 
 use super::bins::{self, Bins, Domain, Split};
-#[cfg(target_arch = "x86_64")]
-use super::bins_x86;
 use super::record::{self, Record, Span};
 #[cfg(target_arch = "x86_64")]
 use super::record_x86;
+#[cfg(target_arch = "x86_64")]
+use super::{best_x86, bins_x86};
 use crate::scene::Scene;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,7 +69,7 @@ impl Kernel {
         match self {
             Kernel::Scalar => all.best(bins),
             #[cfg(target_arch = "x86_64")]
-            Kernel::Avx2 => bins_x86::best(all, bins),
+            Kernel::Avx2 => best_x86::best(all, bins),
         }
     }
 

@@ -54,9 +54,10 @@ impl Tree {
             Tree::Part(nodes) => {
                 // Node 0 goes to the slot, the others behind what is there.
                 let base = out.len() as u32 - 1;
-                let moved = |n: &Slim| Slim { first: if n.count == 0 { n.first + base } else { n.first }, ..*n };
-                out[slot] = moved(&nodes[0]);
-                out.extend(nodes[1..].iter().map(moved));
+                let mut moved =
+                    nodes.into_iter().map(|n| Slim { first: if n.count == 0 { n.first + base } else { n.first }, ..n });
+                out[slot] = moved.next().expect("a part has a root");
+                out.extend(moved);
             }
             Tree::Fork(bounds, sides) => {
                 let first = out.len();
