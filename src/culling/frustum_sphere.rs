@@ -4,7 +4,8 @@
 //! The sphere is the one around the middle of a node's box through its corners; a plane
 //! is compared with one number, `n.c + d`, where a box needs another for its nearest corner.
 //! It is larger than the box, so more is kept; **conservative**. The point is the middle
-//! alone: what reaches into the view from outside is lost. **Aggressive**, and a point
+//! alone: what reaches into the view from outside is lost, and going down a hierarchy all
+//! below a node whose middle is out of view, be it the root. **Aggressive**, and a point
 //! inside says nothing of what is below its node, so its carry is never 0.
 //!
 //! # Arithmetic

@@ -7,7 +7,7 @@
 //! as long as one of them is, and no farther.
 
 use super::{Tally, Verdict};
-use crate::hierarchy::{Hierarchy, LANES, NONE};
+use crate::hierarchy::{Hierarchy, NONE};
 use crate::registry::{Default as Allowed, Param};
 
 pub(super) const SATURATION: Param = Param {
@@ -52,12 +52,12 @@ impl Saturation {
         asked
     }
 
-    /// Keeps the lanes that were not asked: to go on, if they would, iff something below is.
+    /// Keeps the lanes that were not asked: to go on, if they would, iff something below
+    /// is. The carries of masks are 0 and 1.
     pub fn keep_others(&self, block: u32, asked: u8, verdict: &mut Verdict) {
         verdict.outside &= asked;
-        let below = self.below[block as usize];
-        for lane in (0..LANES).filter(|l| asked >> l & 1 == 0) {
-            verdict.carry[lane] &= below >> lane & 1;
-        }
+        let goes_on = asked | self.below[block as usize];
+        // Without branches, which would follow no pattern.
+        verdict.carry.iter_mut().enumerate().for_each(|(lane, carry)| *carry &= goes_on >> lane & 1);
     }
 }

@@ -72,7 +72,14 @@ fn walked(view: &View, h: &Hierarchy, tests: &mut [Box<dyn Test>], walk: &mut dy
 fn sums() -> Vec<String> {
     let alone = TESTS.iter().map(|e| e.name.to_string());
     let behind = TESTS.iter().filter(|e| e.name != "frustum").map(|e| format!("frustum+{}", e.name));
-    let more = ["none", "frustum:last_plane=true", "frustum:node_test=box_plane", "normal_mask:rays=node+frustum"];
+    let more = [
+        "none",
+        "frustum:last_plane=true",
+        "frustum:node_test=box_plane",
+        "normal_mask:rays=node+frustum",
+        "frustum:octant=true,sat=true+octant_mask:saturation=0.3",
+        "frustum:primitive=point",
+    ];
     let three = "octant_mask+frustum:arithmetic=f64+normal_cone:form=tight";
     alone.chain(behind).chain(more.map(String::from)).chain([three.to_string()]).collect()
 }
@@ -111,6 +118,32 @@ fn marks_of_nodes_make_up_what_the_walk_submitted_and_jumping_changes_nothing() 
         }
     }
     assert_eq!(marks.into_iter().collect::<Vec<_>>(), [0, 1, 2, 16, 17, 18], "every kind of mark occurred");
+}
+
+/// Frames that nobody judged are shown as if they had been.
+#[test]
+fn a_frame_that_a_walk_would_not_judge_shows_its_nodes() {
+    let spec = run_spec("list", "none", "flat", 3);
+    let scene = load::load(&spec.scene).unwrap();
+    let mut poses = walkthrough::load(&spec.path, &spec.scene, &scene).unwrap();
+    poses.insert(1, poses[0]);
+    let h = structure::make(&Spec::parse("octree:depth=4").unwrap()).unwrap().0.build(&scene).unwrap();
+    for (walk, other) in [("depth_first", "still=true"), ("flat", "still=true"), ("depth_first", "small=40")] {
+        let walk_of = |text: &str| make_walk(&Spec::parse(text).unwrap()).unwrap().0;
+        let view = |walk: Box<dyn Walk>| view_of(&scene, &poses, &spec.camera, &h, "frustum", walk);
+        let (mut plain, mut skipping) = (view(walk_of(walk)), view(walk_of(&format!("{walk}:{other}"))));
+        for n in 0..poses.len() {
+            let frame = skipping.frame(n, false).unwrap();
+            if other == "still=true" {
+                assert!(frame == plain.frame(n, false).unwrap(), "{walk}:{other}, frame {n}");
+            }
+            let mut tests = make_tests(&parse_sum("frustum").unwrap()).unwrap().0;
+            tests.iter_mut().for_each(|t| _ = t.prepare(&scene, &h));
+            let view = View::new(&spec.camera, &poses[n]);
+            let want = walked(&view, &h, &mut tests, walk_of(&format!("{walk}:{other}")).as_mut());
+            assert_eq!(marked(&h, &Frame::read(&frame).nodes), want, "{walk}:{other}, frame {n}");
+        }
+    }
 }
 
 /// Draws one more entry every frame.
