@@ -5,6 +5,7 @@ pub mod bsp;
 pub mod builder;
 pub mod list;
 pub mod octree;
+pub mod portal_octree;
 
 use crate::error::Result;
 use crate::hierarchy::Hierarchy;
@@ -20,7 +21,7 @@ pub trait Structure: Send + Sync {
 }
 
 /// Sorted by name.
-pub static ALL: &[Entry<dyn Structure>] = &[bsp::ENTRY, list::ENTRY, octree::ENTRY];
+pub static ALL: &[Entry<dyn Structure>] = &[bsp::ENTRY, list::ENTRY, octree::ENTRY, portal_octree::ENTRY];
 
 /// The structure that `spec` names, with the spec's defaults filled in.
 pub fn make(spec: &Spec) -> Result<(Box<dyn Structure>, Spec)> {

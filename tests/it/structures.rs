@@ -1,7 +1,8 @@
 //! Structures: every triangle kept, bounds that hold, counts in the paper's terms.
 
 mod bsp;
-mod policies;
+pub mod policies;
+pub mod portal_octree;
 
 use crate::common::soup;
 use cullmark::hierarchy::{Hierarchy, LANES, NONE};
@@ -18,7 +19,7 @@ fn build(text: &str, scene: &Scene) -> Hierarchy {
 }
 
 /// A scene of the given triangles, three materials by turns.
-fn scene_of(name: &str, triangles: &[[DVec3; 3]]) -> Scene {
+pub fn scene_of(name: &str, triangles: &[[DVec3; 3]]) -> Scene {
     let n = triangles.len() as u32;
     let mut scene = Scene {
         name: name.to_string(),
@@ -92,6 +93,8 @@ const OCTREES: &[&str] = &[
 const REPLICATED: &[&str] =
     &["octree:policy=R", "octree:policy=R,depth=2,root=cube", "octree:policy=R,depth=5,leaf_limit=40"];
 
+const PORTAL_OCTREES: &[&str] = &["portal_octree", "portal_octree:depth=3,planes=middle,texels=7"];
+
 const SPLIT: &[&str] =
     &["octree:policy=S", "octree:policy=S,depth=3,root=cube", "octree:policy=S,depth=5,leaf_limit=40"];
 
@@ -105,7 +108,7 @@ const BSPS: &[&str] = &[
 ];
 
 fn all() -> impl Iterator<Item = &'static str> {
-    [LISTS, OCTREES, REPLICATED, SPLIT, BSPS].into_iter().flatten().copied()
+    [LISTS, OCTREES, REPLICATED, PORTAL_OCTREES, SPLIT, BSPS].into_iter().flatten().copied()
 }
 
 /// Large triangles through each other: small leaves need more pieces than a BSP may make.
@@ -179,7 +182,7 @@ fn the_number_of_threads_changes_nothing() {
         });
         assert!(a.entries == b.entries && a.fragments == b.fragments && a.material_run == b.material_run, "{text}");
         assert!(a.bounds == b.bounds && a.links == b.links && a.parent == b.parent && a.stats == b.stats, "{text}");
-        assert!(a.half_spaces == b.half_spaces, "{text}");
+        assert!(a.half_spaces == b.half_spaces && a.portals == b.portals, "{text}");
     }
 }
 

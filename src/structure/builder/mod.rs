@@ -4,6 +4,8 @@
 pub mod collapse;
 pub mod cut;
 pub mod morton;
+pub mod openings;
+pub mod overlap;
 pub mod piece;
 
 use crate::hierarchy::{BoundsBlock, BuildStats, HalfSpace, Hierarchy, LANES, LinkBlock, NONE};

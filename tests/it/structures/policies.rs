@@ -17,7 +17,7 @@ fn area(t: &[DVec3; 3]) -> f64 {
 }
 
 /// Seeded numbers in 0..1.
-fn random(seed: u64) -> impl FnMut() -> f64 {
+pub fn random(seed: u64) -> impl FnMut() -> f64 {
     use rand_chacha::rand_core::{RngCore, SeedableRng};
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     move || (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
