@@ -6,6 +6,7 @@ pub mod back_face;
 pub mod depth_first;
 mod descent;
 pub mod distinct;
+mod draw_list;
 pub mod facing_columns;
 pub mod facing_fixed;
 pub mod facing_kernels;
@@ -34,12 +35,16 @@ pub mod normal_cone;
 pub mod normal_mask;
 mod normal_mask_local;
 pub mod octant_mask;
+pub mod portals;
+pub mod portals_screen;
 #[cfg(target_arch = "x86_64")]
 mod prefetch_x86;
 pub mod sector;
 #[cfg(target_arch = "x86_64")]
 pub mod sector_x86;
 pub mod triangle_words;
+
+pub use draw_list::DrawList;
 
 use crate::error::Result;
 use crate::hierarchy::Hierarchy;
@@ -171,6 +176,13 @@ pub fn judge_flat_by_block<T: Test + ?Sized>(
 pub trait Walk: Send {
     /// A reason why this walk cannot run on `hierarchy`, if it cannot.
     fn refuses(&self, hierarchy: &Hierarchy) -> Option<String>;
+    /// What the walk itself promises and is entitled to remove, whatever the tests.
+    fn class(&self) -> Class {
+        Class::Conservative
+    }
+    fn removes(&self) -> Removes {
+        Removes::default()
+    }
     /// Forgets earlier frames, as [`Test::reset`].
     fn reset(&mut self) {}
     /// Whether earlier frames of the pass may change what is submitted. If not, any
@@ -187,75 +199,6 @@ pub trait Walk: Send {
         out: &mut DrawList,
         tally: &mut Tally,
     );
-}
-
-/// What a frame submits: ranges of entry positions, merged when contiguous.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct DrawList {
-    pub ranges: Vec<(u32, u32)>,
-    /// Triangles were judged one by one, so what is drawn is an index list written
-    /// anew this frame: ranges of one material follow each other in it without a gap.
-    pub compacted: bool,
-    spare: Vec<(u32, u32)>,
-}
-
-impl DrawList {
-    pub fn clear(&mut self) {
-        self.ranges.clear();
-        self.compacted = false;
-    }
-
-    /// Keeps the positions that `keep` says yes to and marks the list as compacted.
-    #[inline]
-    pub fn retain(&mut self, mut keep: impl FnMut(u32) -> bool) {
-        let before = std::mem::replace(&mut self.ranges, std::mem::take(&mut self.spare));
-        self.ranges.clear();
-        for (first, end) in &before {
-            for position in (*first..*end).filter(|p| keep(*p)) {
-                self.push(position, position + 1);
-            }
-        }
-        self.spare = before;
-        self.compacted = true;
-    }
-
-    #[inline]
-    pub fn push(&mut self, first: u32, end: u32) {
-        if first == end {
-            return;
-        }
-        match self.ranges.last_mut() {
-            Some(last) if last.1 == first => last.1 = end,
-            _ => self.ranges.push((first, end)),
-        }
-    }
-
-    /// Entries submitted, duplicates included.
-    pub fn entry_count(&self) -> u64 {
-        self.ranges.iter().map(|(a, b)| u64::from(b - a)).sum()
-    }
-
-    pub fn positions(&self) -> impl Iterator<Item = u32> + '_ {
-        self.ranges.iter().flat_map(|(a, b)| *a..*b)
-    }
-
-    /// Draw calls: one a material run of each range; of a compacted list, one a
-    /// material run that is touched at all.
-    pub fn draw_calls(&self, hierarchy: &Hierarchy) -> u64 {
-        let runs = |(a, b): &(u32, u32)| u64::from(hierarchy.material_runs(*a, *b));
-        let whole: u64 = self.ranges.iter().map(runs).sum();
-        if !self.compacted {
-            return whole;
-        }
-        let run = |position: u32| hierarchy.material_run[position as usize];
-        let shared = self.ranges.windows(2).filter(|w| run(w[0].1 - 1) == run(w[1].0)).count();
-        whole - shared as u64
-    }
-
-    /// Draw calls if all triangles had one material.
-    pub fn draw_calls_any_material(&self) -> u64 {
-        if self.compacted { u64::from(!self.ranges.is_empty()) } else { self.ranges.len() as u64 }
-    }
 }
 
 /// Work of one frame. Bit-identical between repeats, threads and instruction sets.
@@ -276,6 +219,11 @@ pub struct Tally {
     pub predicates: u64,
     pub fallbacks_f64: u64,
     pub fallbacks_exact: u64,
+    /// Cells that were seen into, and openings projected to the screen.
+    #[serde(default)]
+    pub cells_reached: u64,
+    #[serde(default)]
+    pub portals_tested: u64,
 }
 
 impl std::iter::Sum for Tally {
@@ -289,13 +237,15 @@ impl std::iter::Sum for Tally {
             predicates: a.predicates + b.predicates,
             fallbacks_f64: a.fallbacks_f64 + b.fallbacks_f64,
             fallbacks_exact: a.fallbacks_exact + b.fallbacks_exact,
+            cells_reached: a.cells_reached + b.cells_reached,
+            portals_tested: a.portals_tested + b.portals_tested,
         })
     }
 }
 
 impl Tally {
     /// Name, unit and value of every counter: counters are data.
-    pub fn named(&self) -> [(&'static str, &'static str, u64); 8] {
+    pub fn named(&self) -> [(&'static str, &'static str, u64); 10] {
         [
             ("nodes_visited", "nodes", self.nodes_visited),
             ("lane_tests", "lanes", self.lane_tests),
@@ -305,6 +255,8 @@ impl Tally {
             ("predicates", "signs", self.predicates),
             ("fallbacks_f64", "signs", self.fallbacks_f64),
             ("fallbacks_exact", "signs", self.fallbacks_exact),
+            ("cells_reached", "cells", self.cells_reached),
+            ("portals_tested", "portals", self.portals_tested),
         ]
     }
 }
@@ -321,7 +273,7 @@ pub static TESTS: &[Entry<dyn Test>] = &[
 ];
 
 /// Sorted by name.
-pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, flat::ENTRY];
+pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, flat::ENTRY, portals::ENTRY];
 
 /// The parts of a sum, made, and their resolved specs.
 pub type Sum = (Vec<Box<dyn Test>>, Vec<Spec>);
@@ -380,9 +332,10 @@ pub fn make_walk(spec: &Spec) -> Result<(Box<dyn Walk>, Spec)> {
     Ok((entry.build(&resolved), resolved))
 }
 
-/// Class and entitlement of a sum of tests: the weakest class, the union of sets.
-pub fn promise(tests: &[Box<dyn Test>]) -> (Class, Removes) {
-    tests.iter().fold((Class::Conservative, Removes::default()), |(class, removes), t| {
-        (class.max(t.class()), removes.union(t.removes()))
-    })
+/// Class and entitlement of a sum of tests under a walk: the weakest class, the union
+/// of sets.
+pub fn promise(tests: &[Box<dyn Test>], walk: &dyn Walk) -> (Class, Removes) {
+    tests
+        .iter()
+        .fold((walk.class(), walk.removes()), |(class, removes), t| (class.max(t.class()), removes.union(t.removes())))
 }
