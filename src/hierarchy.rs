@@ -5,6 +5,10 @@
 //! `block * 8 + lane`. The entries (triangles, or fragments of triangles) of a
 //! subtree are contiguous positions, so "wholly inside" is one range.
 
+pub mod portals;
+
+pub use portals::Portals;
+
 use crate::math::{Aabb, Box32, DVec3};
 use crate::scene::Scene;
 use glam::Vec3;
@@ -89,6 +93,8 @@ pub struct Hierarchy {
     pub fragments: Option<Vec<[DVec3; 3]>>,
     /// Optional column, by node: what a BSP's partition plane says of the node.
     pub half_spaces: Option<Vec<Option<HalfSpace>>>,
+    /// Optional column: the leaves as cells of a grid, and what is open between them.
+    pub portals: Option<Portals>,
     pub stats: BuildStats,
 }
 
@@ -119,6 +125,7 @@ impl Hierarchy {
             + size_of_val(&self.material_run[..])
             + self.fragments.as_ref().map_or(0, |f| size_of_val(&f[..]))
             + self.half_spaces.as_ref().map_or(0, |h| size_of_val(&h[..]))
+            + self.portals.as_ref().map_or(0, Portals::bytes)
     }
 
     /// Entries over scene triangles: 1 without replication or splitting.
@@ -165,6 +172,7 @@ impl Hierarchy {
         let mut seen = vec![false; scene.len()];
         self.entries.iter().for_each(|t| seen[*t as usize] = true);
         assert!(seen.iter().all(|s| *s), "every triangle has an entry");
+        self.portals.iter().for_each(|p| p.assert_fits(self));
         let mut reached = vec![false; blocks];
         let mut held = vec![Box32::EMPTY; scene.len()];
         let mut covered = 0;

@@ -89,7 +89,7 @@ impl Setup {
         if let Some(why) = walk.refuses(&hierarchy) {
             return Err(Error::new(format!("the walk cannot run over this structure: {why}")));
         }
-        let (class, removes) = culling::promise(&tests);
+        let (class, removes) = culling::promise(&tests, walk.as_ref());
         let views = poses.iter().map(|p| View::new(camera, p)).collect();
         Ok(Setup {
             scene,

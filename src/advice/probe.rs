@@ -118,7 +118,7 @@ impl Built {
     /// Class and mean counts of `combination`, whose structure this is, over `views`.
     pub fn count(&mut self, scene: &Scene, combination: &Combination, views: &[View]) -> Result<(Class, Counts)> {
         self.take(scene, combination)?;
-        let (class, _) = culling::promise(&self.tests);
+        let (class, _) = culling::promise(&self.tests, self.walk.as_ref());
         Ok((class, self.pass(views)))
     }
 

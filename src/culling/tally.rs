@@ -56,6 +56,10 @@ counters! {
     frames_reused: "frames",
     /// Subtrees submitted whole because they are small.
     subtrees_not_entered: "subtrees",
+    /// Cells of a portal-octree that were seen into.
+    cells_reached: "cells",
+    /// Openings between cells that were projected to the screen.
+    portals_tested: "portals",
 }
 
 impl Tally {

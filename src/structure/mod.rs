@@ -10,6 +10,7 @@ pub mod kd_tree;
 pub mod list;
 pub mod nested_grid;
 pub mod octree;
+pub mod portal_octree;
 pub mod uniform_grid;
 
 use crate::error::Result;
@@ -35,6 +36,7 @@ pub static ALL: &[Entry<dyn Structure>] = &[
     list::ENTRY,
     nested_grid::ENTRY,
     octree::ENTRY,
+    portal_octree::ENTRY,
     uniform_grid::ENTRY,
 ];
 

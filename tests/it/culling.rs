@@ -1,4 +1,4 @@
-//! Culling tests and walks: facts B2-B5, C1, C3, C4 and H of the algorithm notes, and
+//! Culling tests and walks: facts B2-B5, C1, C3, C4, D8, A8 and H of the algorithm notes, and
 //! the agreement of all kernels, accelerations and walks.
 
 mod arithmetics;
@@ -12,6 +12,8 @@ mod kernels;
 mod masks;
 mod numbers;
 mod octants;
+mod portals;
+mod portals_facts;
 mod primitives;
 mod sat;
 mod sectors;

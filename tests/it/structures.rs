@@ -4,7 +4,8 @@ mod bsp;
 mod bvh;
 mod grids;
 mod kd_tree;
-mod policies;
+pub mod policies;
+pub mod portal_octree;
 
 use crate::common::soup;
 use cullmark::hierarchy::{Hierarchy, LANES, NONE};
@@ -21,7 +22,7 @@ fn build(text: &str, scene: &Scene) -> Hierarchy {
 }
 
 /// A scene of the given triangles, three materials by turns.
-fn scene_of(name: &str, triangles: &[[DVec3; 3]]) -> Scene {
+pub fn scene_of(name: &str, triangles: &[[DVec3; 3]]) -> Scene {
     let n = triangles.len() as u32;
     let mut scene = Scene {
         name: name.to_string(),
@@ -109,6 +110,8 @@ const LOOSE: &[&str] = &[
     "kd_tree:split=median,leaf_size=20",
 ];
 
+const PORTAL_OCTREES: &[&str] = &["portal_octree", "portal_octree:depth=3,planes=middle,texels=7"];
+
 const REPLICATED: &[&str] = &[
     "octree:policy=R",
     "octree:policy=R,depth=2,root=cube",
@@ -167,7 +170,7 @@ const BVHS: &[&str] = &[
 ];
 
 fn all() -> impl Iterator<Item = &'static str> {
-    [LISTS, OCTREES, LOOSE, REPLICATED, SPLIT, BSPS, BVHS, HYBRIDS].into_iter().flatten().copied()
+    [LISTS, OCTREES, LOOSE, REPLICATED, PORTAL_OCTREES, SPLIT, BSPS, BVHS, HYBRIDS].into_iter().flatten().copied()
 }
 
 /// Large triangles through each other: small leaves need more pieces than a BSP may make.
@@ -242,7 +245,7 @@ fn the_number_of_threads_changes_nothing() {
         });
         assert!(a.entries == b.entries && a.fragments == b.fragments && a.material_run == b.material_run, "{text}");
         assert!(a.bounds == b.bounds && a.links == b.links && a.parent == b.parent && a.stats == b.stats, "{text}");
-        assert!(a.half_spaces == b.half_spaces, "{text}");
+        assert!(a.half_spaces == b.half_spaces && a.portals == b.portals, "{text}");
     }
 }
 

@@ -7,6 +7,7 @@
 //! its cell, not the members' own boxes: a triangle has a copy in every cell it
 //! overlaps, and each answers for its part.
 
+pub use super::overlap::triangle_overlaps;
 use super::piece::Piece;
 use super::{Node, flatten, pull_up_bounds, sort_by_material, stats};
 use crate::error::{Error, Result};
@@ -23,17 +24,36 @@ const TASK_TRIANGLES: usize = 1 << 10;
 
 /// Policy R: a copy in every leaf that the triangle overlaps.
 pub fn build_replicated(scene: &Scene, root: &Aabb, depth: u32, leaf_limit: u32) -> Result<Hierarchy> {
-    let tree = Tree::grow(scene, root, depth, leaf_limit, entries_max(scene), &|t, _, out: &mut Vec<u32>| out.push(t))?;
+    let plan = Plan { depth, leaf_limit, entries_max: entries_max(scene), split: &|cell| cell.bounds.centre() };
+    Ok(replicated(scene, root, plan)?.0)
+}
+
+/// Policy R over a grid of cells: all leaves at depth `bits`, their planes given. Also
+/// where each leaf's cell is, in the order of the leaves' entries.
+pub fn build_cells(scene: &Scene, planes: &[Vec<f64>; 3], bits: u32) -> Result<(Hierarchy, Vec<[u32; 3]>)> {
+    let end = |of: fn(&Vec<f64>) -> f64| DVec3::from([0, 1, 2].map(|axis| of(&planes[axis])));
+    let root = Aabb { lo: end(|p| p[0]), hi: end(|p| p[p.len() - 1]) };
+    let middle = |cell: &Cell| {
+        let plane = |axis: usize| planes[axis][(2 * cell.at[axis] as usize + 1) << (bits - cell.level - 1)];
+        DVec3::new(plane(0), plane(1), plane(2))
+    };
+    replicated(scene, &root, Plan { depth: bits, leaf_limit: 0, entries_max: entries_max(scene), split: &middle })
+}
+
+fn replicated(scene: &Scene, root: &Aabb, plan: Plan) -> Result<(Hierarchy, Vec<[u32; 3]>)> {
+    let tree = Tree::grow(scene, root, plan, &|t, _, out: &mut Vec<u32>| out.push(t))?;
     let boxes = tree.boxes(|t, cell| intersection(&scene.triangle_aabb(*t), cell));
     let entries = tree.items().copied().collect();
-    Ok(tree.finish(scene, leaf_limit, &boxes, entries, None))
+    let cells = tree.leaves.iter().map(|leaf| leaf.cell.at).collect();
+    Ok((tree.finish(scene, plan.leaf_limit, &boxes, entries, None), cells))
 }
 
 /// Policy S: in every leaf, what its cell leaves of the triangles that R would
 /// copy there. Clipping each triangle once, at its leaf, makes a fraction of the
 /// pieces that splitting level by level does, whose diagonals are split again.
 pub fn build_split(scene: &Scene, root: &Aabb, depth: u32, leaf_limit: u32) -> Result<Hierarchy> {
-    let tree = Tree::grow(scene, root, depth, leaf_limit, entries_max(scene), &|t, cell, out: &mut Vec<Piece>| {
+    let plan = Plan { depth, leaf_limit, entries_max: entries_max(scene), split: &|cell| cell.bounds.centre() };
+    let tree = Tree::grow(scene, root, plan, &|t, cell, out: &mut Vec<Piece>| {
         let inner = |axis: &usize| cell.hi[*axis] < root.hi[*axis];
         out.extend(clip(scene, t, cell, (0..3).filter(inner).fold(0, |faces, axis| faces | 1 << axis)));
     })?;
@@ -48,9 +68,8 @@ pub(super) fn entries_max(scene: &Scene) -> u64 {
     ENTRIES_MAX.max(4 * scene.len() as u64)
 }
 
-/// The triangles that overlap each octant of a cell.
-fn divide(scene: &Scene, triangles: &[u32], cell: &Aabb) -> [Vec<u32>; 8] {
-    let octants = octants(cell);
+/// The triangles that overlap each octant.
+fn divide(scene: &Scene, triangles: &[u32], octants: &[Aabb; 8]) -> [Vec<u32>; 8] {
     let mut out: [Vec<u32>; 8] = Default::default();
     for t in triangles {
         let corners = scene.corners(*t);
@@ -102,9 +121,8 @@ pub(super) fn clip(scene: &Scene, triangle: u32, cell: &Aabb, not_ours: u8) -> V
         .collect()
 }
 
-/// Octant `i` of a cell: bit 0 upper in x, bit 1 in y, bit 2 in z.
-pub fn octants(cell: &Aabb) -> [Aabb; 8] {
-    let middle = cell.centre();
+/// Octant `i` of a cell around a point: bit 0 upper in x, bit 1 in y, bit 2 in z.
+pub fn octants(cell: &Aabb, middle: DVec3) -> [Aabb; 8] {
     [0, 1, 2, 3, 4, 5, 6, 7].map(|i| {
         let mut octant = *cell;
         for axis in 0..3 {
@@ -118,42 +136,22 @@ pub fn intersection(a: &Aabb, b: &Aabb) -> Aabb {
     Aabb { lo: a.lo.max(b.lo), hi: a.hi.min(b.hi) }
 }
 
-/// Separating-axis test of a triangle and a closed box (Akenine-Möller 2001).
-///
-/// Never says "apart" because of rounding: an axis separates only by more than
-/// the error of its own evaluation. So touching counts as overlapping, also at
-/// large offsets, and a pair within about 16 roundings may count as touching.
-pub fn triangle_overlaps(corners: &[DVec3; 3], cell: &Aabb) -> bool {
-    let bounds = Aabb::of_points(corners);
-    if !bounds.overlaps(cell) {
-        return false;
-    }
-    // Wholly in the cell: no axis can separate. Most triangles, and exact.
-    if bounds.lo.cmpge(cell.lo).all() && bounds.hi.cmple(cell.hi).all() {
-        return true;
-    }
-    let size = bounds.lo.abs().max(bounds.hi.abs()).max(cell.lo.abs()).max(cell.hi.abs()).max_element();
-    let centre = cell.centre();
-    let half = cell.size() * 0.5 + DVec3::splat(16.0 * f64::EPSILON * size);
-    let v = corners.map(|p| p - centre);
-    let edges = [corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]];
+/// A box that is divided: `at` numbers it among the 2^`level` of each axis.
+#[derive(Clone, Copy)]
+struct Cell {
+    bounds: Aabb,
+    at: [u32; 3],
+    level: u32,
+}
 
-    let (e, f) = (edges[0], edges[1]);
-    let normal = e.cross(f);
-    let (ea, fa) = (e.abs(), f.abs());
-    let permanent = DVec3::new(ea.y * fa.z + ea.z * fa.y, ea.z * fa.x + ea.x * fa.z, ea.x * fa.y + ea.y * fa.x);
-    let error = 8.0 * f64::EPSILON * permanent.dot(v[0].abs() + half);
-    if normal.dot(v[0]).abs() > normal.abs().dot(half) + error {
-        return false;
-    }
-    edges.iter().all(|e| {
-        // Cross products of the edge with the three axes.
-        [DVec3::new(0.0, -e.z, e.y), DVec3::new(e.z, 0.0, -e.x), DVec3::new(-e.y, e.x, 0.0)].iter().all(|axis| {
-            let s = v.map(|p| axis.dot(p));
-            let reach = axis.abs().dot(half);
-            s[0].min(s[1]).min(s[2]) <= reach && s[0].max(s[1]).max(s[2]) >= -reach
-        })
-    })
+/// How far to divide, and where.
+#[derive(Clone, Copy)]
+struct Plan<'a> {
+    depth: u32,
+    leaf_limit: u32,
+    entries_max: u64,
+    /// The point at which the eight octants of a cell meet.
+    split: &'a (dyn Fn(&Cell) -> DVec3 + Sync),
 }
 
 /// `Inner` without children is an empty leaf.
@@ -164,7 +162,7 @@ enum Branch<T> {
 
 struct Leaf<T> {
     node: usize,
-    cell: Aabb,
+    cell: Cell,
     /// Triangles that overlap the cell; under S other than the items cut from them.
     triangles: usize,
     items: Vec<T>,
@@ -182,9 +180,7 @@ type Put<'a, T> = &'a (dyn Fn(u32, &Aabb, &mut Vec<T>) + Sync);
 struct Growth<'a, T> {
     scene: &'a Scene,
     put: Put<'a, T>,
-    depth: u32,
-    leaf_limit: usize,
-    entries_max: u64,
+    plan: Plan<'a>,
     /// Entries of finished leaves. Only grows, so whether it passes the limit
     /// does not depend on the order of tasks.
     entries: AtomicU64,
@@ -192,26 +188,33 @@ struct Growth<'a, T> {
 
 impl<T: Send> Growth<'_, T> {
     /// `None` past the limit of entries.
-    fn grow(&self, mut triangles: Vec<u32>, cell: Aabb, level: u32) -> Option<Branch<T>> {
-        if level == self.depth || triangles.len() <= self.leaf_limit {
+    fn grow(&self, mut triangles: Vec<u32>, cell: Cell) -> Option<Branch<T>> {
+        let Plan { depth, leaf_limit, entries_max, split } = self.plan;
+        if cell.level == depth || triangles.len() <= leaf_limit as usize {
             sort_by_material(&mut triangles, self.scene);
             let mut items = Vec::with_capacity(triangles.len());
-            triangles.iter().for_each(|t| (self.put)(*t, &cell, &mut items));
+            triangles.iter().for_each(|t| (self.put)(*t, &cell.bounds, &mut items));
             let size = items.len() as u64;
             let before = self.entries.fetch_add(size, Ordering::Relaxed);
             let leaf = Leaf { node: 0, cell, triangles: triangles.len(), items };
             let branch = if size == 0 { Branch::Inner(Vec::new()) } else { Branch::Leaf(leaf) };
-            return (before + size <= self.entries_max).then_some(branch);
+            return (before + size <= entries_max).then_some(branch);
         }
-        if self.entries.load(Ordering::Relaxed) > self.entries_max {
+        if self.entries.load(Ordering::Relaxed) > entries_max {
             return None;
         }
         let parallel = triangles.len() >= TASK_TRIANGLES;
-        let parts = divide(self.scene, &triangles, &cell);
+        let octants = octants(&cell.bounds, split(&cell));
+        let parts = divide(self.scene, &triangles, &octants);
         drop(triangles);
-        let parts: Vec<(Vec<u32>, Aabb)> =
-            parts.into_iter().zip(octants(&cell)).filter(|(part, _)| !part.is_empty()).collect();
-        let below = |(part, octant)| self.grow(part, octant, level + 1);
+        let octant = |i: usize| Cell {
+            bounds: octants[i],
+            at: [0, 1, 2].map(|axis| 2 * cell.at[axis] + (i as u32 >> axis & 1)),
+            level: cell.level + 1,
+        };
+        let mut parts: Vec<(Vec<u32>, Cell)> = parts.into_iter().zip((0..8).map(octant)).collect();
+        parts.retain(|(part, _)| !part.is_empty());
+        let below = |(part, octant)| self.grow(part, octant);
         let children: Option<Vec<Branch<T>>> =
             if parallel { parts.into_par_iter().map(below).collect() } else { parts.into_iter().map(below).collect() };
         let mut children = children?;
@@ -221,28 +224,23 @@ impl<T: Send> Growth<'_, T> {
 }
 
 impl<T: Send + Sync> Tree<T> {
-    fn grow(
-        scene: &Scene,
-        root: &Aabb,
-        depth: u32,
-        leaf_limit: u32,
-        entries_max: u64,
-        put: Put<'_, T>,
-    ) -> Result<Tree<T>> {
+    fn grow(scene: &Scene, root: &Aabb, plan: Plan, put: Put<'_, T>) -> Result<Tree<T>> {
         let mut tree = Tree { nodes: Vec::new(), leaves: Vec::new() };
         if scene.is_empty() {
             return Ok(tree);
         }
-        let leaf_limit = leaf_limit as usize;
-        let growth = Growth { scene, put, depth, leaf_limit, entries_max, entries: AtomicU64::new(0) };
-        let branch = growth.grow((0..scene.len() as u32).collect(), *root, 0).ok_or_else(|| {
+        let growth = Growth { scene, put, plan, entries: AtomicU64::new(0) };
+        let cell = Cell { bounds: *root, at: [0; 3], level: 0 };
+        let branch = growth.grow((0..scene.len() as u32).collect(), cell).ok_or_else(|| {
             Error::new(format!(
-                "an octree of depth {depth} over `{}` has more than {entries_max} entries ({} triangles)",
+                "an octree of depth {} over `{}` has more than {} entries ({} triangles)",
+                plan.depth,
                 scene.name,
+                plan.entries_max,
                 scene.len()
             ))
             .key("depth")
-            .help("lower `depth`, raise `leaf_limit`, or take policy \"L\", which holds each triangle once")
+            .help("lower `depth`; an `octree` also has `leaf_limit`, and policy \"L\", which holds each triangle once")
         })?;
         tree.nodes.push(Node::new(0, 0, 0));
         tree.lay(branch, 0, 0);
@@ -282,7 +280,7 @@ impl<T: Send + Sync> Tree<T> {
 
     /// Box of every leaf, from that of each item in the leaf's cell.
     fn boxes(&self, of: impl Fn(&T, &Aabb) -> Aabb + Sync) -> Vec<Aabb> {
-        let leaf_box = |leaf: &Leaf<T>| leaf.items.iter().fold(Aabb::EMPTY, |b, i| b.union(of(i, &leaf.cell)));
+        let leaf_box = |leaf: &Leaf<T>| leaf.items.iter().fold(Aabb::EMPTY, |b, i| b.union(of(i, &leaf.cell.bounds)));
         self.leaves.par_iter().with_min_len(16).map(leaf_box).collect()
     }
 
@@ -310,60 +308,6 @@ impl<T: Send + Sync> Tree<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
-
-    /// The naive twin: what clipping at the six faces leaves (Sutherland & Hodgman 1974).
-    fn clipped(corners: &[DVec3; 3], cell: &Aabb) -> Vec<DVec3> {
-        let mut polygon = corners.to_vec();
-        for (axis, sign, at) in (0..3).flat_map(|a| [(a, 1.0, cell.lo[a]), (a, -1.0, cell.hi[a])]) {
-            let depth = |p: DVec3| (p[axis] - at) * sign;
-            let mut kept = Vec::new();
-            for i in 0..polygon.len() {
-                let (p, q) = (polygon[i], polygon[(i + 1) % polygon.len()]);
-                if depth(p) >= 0.0 {
-                    kept.push(p);
-                }
-                if depth(p) * depth(q) < 0.0 {
-                    let mut x = p + (q - p) * (depth(p) / (depth(p) - depth(q)));
-                    x[axis] = at;
-                    kept.push(x);
-                }
-            }
-            polygon = kept;
-        }
-        polygon
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(2000))]
-        #[test]
-        fn the_axis_test_agrees_with_clipping(
-            p in prop::array::uniform3(prop::array::uniform3(-2.0..2.0f64)), round in any::<bool>(), far in prop::sample::select(vec![0.0, 65536.0]),
-        ) {
-            // Rounded to halves, corners, edges and faces often touch the unit cube;
-            // halves and the shift are exact.
-            let corners = p.map(|v| DVec3::from(v.map(|x| far + if round { (x * 2.0).round() * 0.5 } else { x })));
-            let cell = Aabb { lo: DVec3::splat(far), hi: DVec3::splat(far + 1.0) };
-            let naive = clipped(&corners, &cell);
-            let says = triangle_overlaps(&corners, &cell);
-            if !naive.is_empty() {
-                prop_assert!(says, "clipping leaves {naive:?}");
-            } else if round {
-                // Clipping rounds where it cuts at thirds: forgive a hair.
-                let shrunk = Aabb { lo: cell.lo - 1e-9, hi: cell.hi + 1e-9 };
-                prop_assert!(!says || !clipped(&corners, &shrunk).is_empty(), "{corners:?}");
-            } else {
-                prop_assert!(!says);
-            }
-        }
-    }
-
-    #[test]
-    fn a_triangle_in_a_shared_face_is_in_both_cells() {
-        let t = [DVec3::new(0.5, 0.2, 0.2), DVec3::new(0.5, 0.8, 0.2), DVec3::new(0.5, 0.2, 0.4)];
-        let [low, high, ..] = octants(&Aabb { lo: DVec3::ZERO, hi: DVec3::ONE });
-        assert!(triangle_overlaps(&t, &low) && triangle_overlaps(&t, &high));
-    }
 
     #[test]
     fn too_many_copies_are_an_error_that_names_the_parameter() {
@@ -371,9 +315,10 @@ mod tests {
         let scene =
             Scene { positions: corners, triangles: vec![[0, 1, 2]; 50], material_id: vec![0; 50], ..Scene::default() };
         let put: Put<'_, u32> = &|t, _, out| out.push(t);
-        let e = Tree::grow(&scene, &scene.bounds(), 6, 0, 3000, put).err().expect("50 large triangles at depth 6");
+        let plan = |depth| Plan { depth, leaf_limit: 0, entries_max: 3000, split: &|cell| cell.bounds.centre() };
+        let e = Tree::grow(&scene, &scene.bounds(), plan(6), put).err().expect("50 large triangles at depth 6");
         assert_eq!(e.key.as_deref(), Some("depth"));
         assert!(e.message.contains("3000") && e.help.is_some(), "{e}");
-        assert!(Tree::grow(&scene, &scene.bounds(), 1, 0, 3000, put).is_ok());
+        assert!(Tree::grow(&scene, &scene.bounds(), plan(1), put).is_ok());
     }
 }

@@ -9,6 +9,8 @@ pub mod facing;
 pub mod graft;
 pub mod leaves;
 pub mod morton;
+pub mod openings;
+pub mod overlap;
 pub mod piece;
 pub mod straddle;
 

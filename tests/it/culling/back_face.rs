@@ -5,10 +5,10 @@ use super::walks::{Method, triangles};
 use crate::common::soup;
 use cullmark::culling::facing_columns::{DoubleBlock, Eye32, Eye64, PlaneBlock, PointBlock, is_kept_unasked};
 use cullmark::culling::facing_kernels::kernels;
-use cullmark::culling::{Class, make_tests, promise, sector};
+use cullmark::culling::{Class, make_tests, make_walk, promise, sector};
 use cullmark::math::predicates::{Facing, facing, facing_along};
 use cullmark::math::{Arithmetic, Camera, DVec3, Pose, Projection, View};
-use cullmark::registry::parse_sum;
+use cullmark::registry::{Spec, parse_sum};
 use cullmark::scene::Scene;
 
 fn parallel() -> Camera {
@@ -262,7 +262,8 @@ fn only_f32_in_world_coordinates_is_aggressive() {
     for name in Arithmetic::NAMES {
         let tests = make_tests(&parse_sum(&format!("back_face:arithmetic={name}")).unwrap()).unwrap().0;
         let want = if *name == "f32_world" { Class::Aggressive } else { Class::Conservative };
-        assert_eq!(promise(&tests).0, want, "{name}");
-        assert!(promise(&tests).1.back_facing && !promise(&tests).1.outside_frustum);
+        let (class, removes) = promise(&tests, make_walk(&Spec::new("flat")).unwrap().0.as_ref());
+        assert_eq!(class, want, "{name}");
+        assert!(removes.back_facing && !removes.outside_frustum);
     }
 }

@@ -110,7 +110,7 @@ fn cull(
     let mut list = DrawList::default();
     let mut walk = make_walk(&Spec::new(walk)).unwrap().0;
     walk.run(view, h, &mut tests, &mut list, &mut Tally::default());
-    (list, promise(&tests).1)
+    (list, promise(&tests, walk.as_ref()).1)
 }
 
 fn build(text: &str, scene: &Scene) -> Option<Hierarchy> {
