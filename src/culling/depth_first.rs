@@ -7,7 +7,7 @@
 //!
 //! Three switches spare work where judging costs more than drawing (measured in
 //! docs/PERFORMANCE.md): `small` submits small subtrees whole, which may only add
-//! triangles; `whole_below` and `still` are in [`super::skipping`].
+//! triangles; `whole_below` and `still` are in `skipping`.
 
 use super::descent::Descent;
 use super::skipping::{STILL, Skipping, WHOLE_BELOW};

@@ -1,7 +1,7 @@
 //! `flat`: no hierarchy. Every leaf (and every node with entries of its own) is
 //! judged by itself, as if the structure were a list of its leaves. A structure
 //! that is a list is judged by the tests' wide kernels. Frames that need no judging at
-//! all are [`super::skipping`]'s.
+//! all are `skipping`'s.
 
 use super::descent::Descent;
 use super::skipping::{STILL, Skipping, WHOLE_BELOW};

@@ -24,7 +24,7 @@ fn of_boxes_256(halves: &Halves, bounds: &BoundsBlock) -> Far {
     let zero = _mm256_setzero_ps();
     let (mut twice, mut size, mut across) = ([zero; 3], zero, zero);
     let mut lanes = 0xff;
-    for axis in 0..3 {
+    for (axis, twice) in twice.iter_mut().enumerate() {
         // SAFETY: a row of 8 f32 is 32 bytes, and rows are 32-byte aligned in the 64-byte aligned block.
         let (lo, hi) = unsafe { (_mm256_load_ps(bounds.lo[axis].as_ptr()), _mm256_load_ps(bounds.hi[axis].as_ptr())) };
         let extent = _mm256_sub_ps(hi, lo);
@@ -32,7 +32,7 @@ fn of_boxes_256(halves: &Halves, bounds: &BoundsBlock) -> Far {
         lanes &= _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(lo, hi)) as u8;
         let eye = _mm256_set1_ps(halves.eye[axis]);
         let (lo, hi) = (_mm256_sub_ps(lo, eye), _mm256_sub_ps(hi, eye));
-        twice[axis] = _mm256_add_ps(lo, hi);
+        *twice = _mm256_add_ps(lo, hi);
         size = _mm256_add_ps(size, _mm256_add_ps(_mm256_and_ps(lo, positive), _mm256_and_ps(hi, positive)));
     }
     let diagonal = _mm256_mul_ps(_mm256_sqrt_ps(across), _mm256_set1_ps(1.0 + GUARD));
