@@ -346,11 +346,12 @@ mod tests {
     fn a_partial_correlation_is_that_of_the_residuals() {
         let (x, y) = ([1.0, 2.0, 3.0, 4.0, 5.0], [2.0, 1.0, 4.0, 3.0, 5.0]);
         let z = [1.0, 3.0, 2.0, 5.0, 4.0];
-        // r_xy = 0.8, r_xz = 0.8, r_yz = 0.5: (0.8 - 0.8 x 0.5) / sqrt(0.36 x 0.75).
+        // Deviations of z -2 0 -1 2 1: r_xy = 0.8, r_xz = 8/10, r_yz = 3/10,
+        // so (0.8 - 0.8 x 0.3) / sqrt(0.36 x 0.91).
         near(pearson(&x, &z), 0.8);
-        near(pearson(&y, &z), 0.5);
-        near(partial(&x, &y, &z), 0.4 / 0.27f64.sqrt());
-        near(partial(&y, &x, &z), 0.4 / 0.27f64.sqrt());
+        near(pearson(&y, &z), 0.3);
+        near(partial(&x, &y, &z), 0.56 / 0.3276f64.sqrt());
+        near(partial(&y, &x, &z), 0.56 / 0.3276f64.sqrt());
         // Triangles and time that both follow the nodes, and differ from them in opposite ways.
         let nodes = [1.0, 2.0, 3.0, 4.0];
         let (more, less) = ([1.1, 1.9, 2.9, 4.1], [0.9, 2.1, 3.1, 3.9]);
