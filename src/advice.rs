@@ -221,7 +221,10 @@ fn predict(
                 let cull = cost::cull_ns(&counts);
                 let draw = counts.draw_ns(&question.model);
                 c.class = Some(class);
-                c.predicted_ns = Some(if question.objective == Objective::Cull { cull } else { cull + draw });
+                c.predicted_ns = Some(match question.objective {
+                    Objective::Cull => cull,
+                    Objective::Frame => question.model.cull_scale * cull + draw,
+                });
                 c.predicted = Some(counts);
             }
         }
@@ -244,7 +247,7 @@ fn reasons(question: &Question, considered: &[Considered], chosen: usize) -> Vec
         own.counts.entries,
         question.scene.len(),
         own.counts.draw_calls,
-        us(own.cull_ns + own.draw_ns),
+        us(question.model.cull_scale * own.cull_ns + own.draw_ns),
     )];
     let rivals =
         considered.iter().enumerate().filter(|(i, _)| *i != chosen).filter_map(|(_, c)| Some((c, c.timed.as_ref()?)));

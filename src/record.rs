@@ -151,17 +151,42 @@ fn is_nowhere(offset_m: &[f64; 3]) -> bool {
 }
 
 /// Derived, always labelled as modelled:
-/// `frame_ms_model = culling + index_ns * indices + draw_call_ns * calls`.
+/// `frame_ms_model = frame_ns + cull_scale * culling + index_ns * indices + draw_call_ns * calls`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TimeModel {
     pub index_ns: f64,
     pub draw_call_ns: f64,
+    /// Of every frame, whatever it shows.
+    #[serde(default, skip_serializing_if = "is_nothing")]
+    pub frame_ns: f64,
+    /// How many times as long the modelled machine culls as the one that was measured.
+    #[serde(default = "as_measured", skip_serializing_if = "is_as_measured")]
+    pub cull_scale: f64,
+}
+
+fn is_nothing(x: &f64) -> bool {
+    *x == 0.0
+}
+
+fn as_measured() -> f64 {
+    1.0
+}
+
+fn is_as_measured(x: &f64) -> bool {
+    *x == 1.0
 }
 
 impl Default for TimeModel {
     /// Non-negative least squares on the eight rows of table 1 of Serpa (2018-19).
     fn default() -> Self {
-        TimeModel { index_ns: 0.32, draw_call_ns: 430.0 }
+        TimeModel { index_ns: 0.32, draw_call_ns: 430.0, frame_ns: 0.0, cull_scale: 1.0 }
+    }
+}
+
+impl TimeModel {
+    /// What a frame takes beside culling.
+    pub fn render_ns(&self, triangles: f64, draw_calls: f64) -> f64 {
+        self.frame_ns + self.index_ns * 3.0 * triangles + self.draw_call_ns * draw_calls
     }
 }
 

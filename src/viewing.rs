@@ -117,7 +117,13 @@ impl RunView {
         }
         self.go_to(n);
         let Setup { scene, hierarchy, views, removes, .. } = &self.setup;
-        let decisions = self.watch.read(|answers| self.numbers.decisions(hierarchy, answers));
+        let decisions = self.watch.read(|heard| match self.setup.walk.removes().occluded {
+            true => {
+                let submitted = heard.submitted.as_ref().unwrap_or(&self.list.ranges);
+                self.numbers.decisions_by_list(hierarchy, &heard.answers, submitted)
+            }
+            false => self.numbers.decisions(hierarchy, &heard.answers),
+        });
         let sent = submitted(scene, hierarchy, &self.list);
         let mut states = vec![State::NOT_SUBMITTED; scene.len()];
         sent.triangles.iter().for_each(|t| states[t as usize] = State::UNSEEN);

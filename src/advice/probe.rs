@@ -56,7 +56,7 @@ impl Counts {
     }
 
     pub fn draw_ns(&self, model: &TimeModel) -> f64 {
-        model.index_ns * 3.0 * self.entries + model.draw_call_ns * self.draw_calls
+        model.render_ns(self.entries, self.draw_calls)
     }
 }
 
@@ -177,12 +177,14 @@ pub fn time(built: &mut [(usize, Built)], views: &[View], question: &Question, c
     for (((i, b), turns), counts) in built.iter().zip(turns).zip(counts) {
         let draw_ns = counts.draw_ns(&question.model);
         let drawn = if question.objective == Objective::Frame { draw_ns } else { 0.0 };
+        let scale = if question.objective == Objective::Frame { question.model.cull_scale } else { 1.0 };
         let (low, high) = stats::median_ci(&turns);
+        let (low, high) = (scale * low, scale * high);
         let cull_ns = stats::median(&turns);
         considered[*i].timed = Some(Timing {
             cull_ns,
             draw_ns,
-            objective_ns: cull_ns + drawn,
+            objective_ns: scale * cull_ns + drawn,
             low_ns: low + drawn,
             high_ns: high + drawn,
             counts,

@@ -84,7 +84,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             return Err(Error::new(format!("is {ns}, but must be 0 or more nanoseconds")).key(key).into());
         }
     }
-    let model = TimeModel { index_ns: args.index_ns, draw_call_ns: args.draw_call_ns };
+    let model = TimeModel { index_ns: args.index_ns, draw_call_ns: args.draw_call_ns, ..TimeModel::default() };
     if let Some(study) = &args.study {
         return study::run(study, &args);
     }

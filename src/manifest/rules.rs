@@ -82,8 +82,8 @@ pub fn matrix(top: &mut Fields, names: &Names, section: &Camera) -> Option<Matri
         return None;
     };
     let scene_axis = match f.one_or_more("scene") {
-        None => (0..names.scenes.len()).collect(),
-        Some(nodes) => named(&f, "scene", nodes, &names.scenes),
+        None => (0..names.here).collect(),
+        Some(nodes) => scenes_named(&f, nodes, names),
     };
     let paths = f.one_or_more("path").map(|nodes| {
         let place = nodes.first().map_or(f.place.clone(), |n| n.place.clone());
@@ -121,6 +121,13 @@ fn axis_values(f: &mut Fields, axis: &'static Axis, section: &Camera) -> Option<
 }
 
 /// Numbers of the scenes or paths that `nodes` name, `*` allowed; each once.
+/// Optional scenes that are not here are no mistake.
+fn scenes_named(f: &Fields, nodes: &[Node], names: &Names) -> Vec<usize> {
+    let mut found = named(f, "scene", nodes, &names.scenes);
+    found.retain(|i| *i < names.here);
+    found
+}
+
 fn named(f: &Fields, what: &'static str, nodes: &[Node], known: &[String]) -> Vec<usize> {
     let mut out = Vec::new();
     for node in nodes {
@@ -200,7 +207,7 @@ fn zips(f: &mut Fields, axes: &[AxisValues], scenes: usize) -> Vec<Zip> {
 pub fn includes(top: &mut Fields, names: &Names, section: &Camera) -> Vec<Include> {
     let mut out = Vec::new();
     for mut f in top.tables("include") {
-        let scenes = f.one_or_more("scene").map(|nodes| named(&f, "scene", nodes, &names.scenes));
+        let scenes = f.one_or_more("scene").map(|nodes| scenes_named(&f, nodes, names));
         let paths = f
             .one_or_more("path")
             .map(|nodes| named(&f, "path", nodes, &names.paths).into_iter().map(|i| names.paths[i].clone()).collect());

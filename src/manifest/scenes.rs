@@ -25,7 +25,9 @@ pub struct Scenes {
 /// Names that selections may use, also of scenes that have mistakes of their own.
 #[derive(Default)]
 pub struct Names {
+    /// Those that are here, by number; then the optional ones that are not.
     pub scenes: Vec<String>,
+    pub here: usize,
     pub paths: Vec<String>,
 }
 
@@ -54,7 +56,6 @@ pub fn read(top: &mut Fields) -> Scenes {
         unique(&mut f, "scene", name.as_deref(), &names.scenes);
         if let (Some(why), Some(name)) = (missing(&mut f), &name) {
             absent.push((name.clone(), why));
-            names.scenes.push(name.clone());
             continue;
         }
         let place = f.place.clone();
@@ -63,6 +64,8 @@ pub fn read(top: &mut Fields) -> Scenes {
         names.scenes.extend(if members.is_empty() { Vec::from_iter(name) } else { member_names(&members) });
         scenes.extend(members.into_iter().map(|s| (s, place.clone())));
     }
+    names.here = names.scenes.len();
+    names.scenes.extend(absent.iter().map(|(name, _)| name.clone()));
     let mut paths: Vec<Vec<PathSpec>> = vec![Vec::new(); scenes.len()];
     for mut f in top.tables("path") {
         let name = f.name("name", "name the path, such as name = \"walk\"");

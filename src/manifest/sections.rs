@@ -154,6 +154,8 @@ pub fn model(top: &mut Fields) -> TimeModel {
     let fits = |x: f64| x >= 0.0 && x.is_finite();
     model.index_ns = f.number("index_ns", "nanoseconds, 0 or more", fits).unwrap_or(model.index_ns);
     model.draw_call_ns = f.number("draw_call_ns", "nanoseconds, 0 or more", fits).unwrap_or(model.draw_call_ns);
+    model.frame_ns = f.number("frame_ns", "nanoseconds, 0 or more", fits).unwrap_or(model.frame_ns);
+    model.cull_scale = f.number("cull_scale", "a factor, 0 or more", fits).unwrap_or(model.cull_scale);
     f.finish();
     model
 }

@@ -108,10 +108,13 @@ fn total_model(grid: &Grid) -> Figure {
 /// The formula with the constants of the study.
 pub fn model_words(grid: &Grid) -> String {
     let model = grid.results.runs.first().map(|r| r.spec.model).unwrap_or_default();
+    let number = |x| format::number(x, 3);
+    let scale = if model.cull_scale == 1.0 { String::new() } else { format!("{} × ", number(model.cull_scale)) };
+    let base = if model.frame_ns == 0.0 { String::new() } else { format!(" + {} ns a frame", number(model.frame_ns)) };
     format!(
-        "Model: measured culling time + {} ns × indices + {} ns × draw calls.",
-        format::number(model.index_ns, 3),
-        format::number(model.draw_call_ns, 3)
+        "Model: {scale}measured culling time + {} ns × indices + {} ns × draw calls{base}.",
+        number(model.index_ns),
+        number(model.draw_call_ns)
     )
 }
 

@@ -3,7 +3,6 @@
 use super::over_frames as frame;
 use crate::claim::Better;
 use crate::error::{Error, Result, did_you_mean};
-use crate::record::TimeModel;
 use crate::results::{RunResult, RunStatus};
 use crate::stats;
 
@@ -259,19 +258,15 @@ pub fn frames(run: &RunResult) -> usize {
     run.cull_ns.len().max(run.triangles.len())
 }
 
-/// The modelled part of every frame beside culling, ns.
-pub fn render_ns(model: &TimeModel, triangles: f64, draw_calls: f64) -> f64 {
-    model.index_ns * 3.0 * triangles + model.draw_call_ns * draw_calls
-}
-
 /// Modelled time of the path, ms, one value a trial.
 fn modelled(run: &RunResult) -> Vec<f64> {
     if run.triangles.is_empty() || run.triangles.len() != run.draw_calls.len() {
         return Vec::new();
     }
     let frames = run.triangles.iter().zip(&run.draw_calls);
-    let render: f64 = frames.map(|(t, d)| render_ns(&run.spec.model, *t, *d)).sum();
-    totals(run).iter().map(|cull| cull + render / 1e6).collect()
+    let render: f64 = frames.map(|(t, d)| run.spec.model.render_ns(*t, *d)).sum();
+    let scale = run.spec.model.cull_scale;
+    totals(run).iter().map(|cull| scale * cull + render / 1e6).collect()
 }
 
 fn totals(run: &RunResult) -> Vec<f64> {

@@ -5,7 +5,6 @@
 //! model, for nothing here draws. The mean is frames over total time; the mean of the rates
 //! of single frames would weigh a fast frame more than a slow one.
 
-use super::metrics::render_ns;
 use crate::results::RunResult;
 use crate::stats;
 
@@ -32,8 +31,8 @@ fn per_trial(run: &RunResult, of: fn(&Frames) -> Option<f64>) -> Vec<f64> {
 
 /// Modelled time of every frame whose culling took `cull_ns`.
 pub fn model_ns(run: &RunResult, cull_ns: &[f64]) -> Vec<f64> {
-    let drawn = run.triangles.iter().zip(&run.draw_calls).map(|(t, d)| render_ns(&run.spec.model, *t, *d));
-    cull_ns.iter().zip(drawn).map(|(cull, draw)| cull + draw).collect()
+    let drawn = run.triangles.iter().zip(&run.draw_calls).map(|(t, d)| run.spec.model.render_ns(*t, *d));
+    cull_ns.iter().zip(drawn).map(|(cull, draw)| run.spec.model.cull_scale * cull + draw).collect()
 }
 
 /// 1e9 over a time in ns; none where the clock saw nothing.

@@ -14,6 +14,8 @@ pub const NOT_REACHED: u8 = 0;
 pub const DRAWN: u8 = 1;
 /// Its children were asked. Entries of its own, if it has any, are submitted.
 pub const WENT_ON: u8 = 2;
+/// The walk passed it by: no opening shows it, though no test is outside of it.
+pub const HIDDEN: u8 = 3;
 /// `CULLED + k`: test `k` was the first to be outside. The walk `flat` asks an inner
 /// node about entries of its own alone: then its children may be reached nonetheless.
 pub const CULLED: u8 = 16;
@@ -80,6 +82,44 @@ impl Numbers {
             let code = &mut codes[self.node(parent / LANES as u32, *parent as usize % LANES)];
             if *code < CULLED {
                 *code = WENT_ON;
+            }
+        }
+        codes
+    }
+
+    /// The same under a walk that leaves nodes out by itself: from what it `submitted`.
+    pub fn decisions_by_list(&self, hierarchy: &Hierarchy, answers: &[Answer], submitted: &[(u32, u32)]) -> Vec<u8> {
+        let mut culled = vec![NOT_REACHED; self.count as usize];
+        for answer in answers {
+            lanes(answer.outside).for_each(|l| culled[self.node(answer.block, l)] = CULLED.saturating_add(answer.test));
+        }
+        // Entries submitted before each range, for how many of a node's are.
+        let before: Vec<u32> = std::iter::once(0)
+            .chain(submitted.iter().scan(0, |sum, (first, end)| {
+                *sum += end - first;
+                Some(*sum)
+            }))
+            .collect();
+        let up_to = |position: u32| {
+            let i = submitted.partition_point(|(first, _)| *first < position);
+            let last = i.checked_sub(1).map_or(0, |i| submitted[i].1.saturating_sub(position));
+            before[i] - last
+        };
+        let mut codes = vec![NOT_REACHED; self.count as usize];
+        let mut pending: Vec<u32> = (0..hierarchy.root_blocks).collect();
+        while let Some(block) = pending.pop() {
+            let links = &hierarchy.links[block as usize];
+            for lane in lanes(links.live) {
+                let (first, end, node) = (links.first[lane], links.end[lane], self.node(block, lane));
+                codes[node] = match up_to(end) - up_to(first) {
+                    0 if culled[node] != NOT_REACHED => culled[node],
+                    0 => HIDDEN,
+                    all if all == end - first => DRAWN,
+                    _ => {
+                        pending.extend(Some(links.child[lane]).filter(|child| *child != NONE));
+                        WENT_ON
+                    }
+                };
             }
         }
         codes

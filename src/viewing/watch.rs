@@ -22,9 +22,17 @@ pub struct Answer {
     pub outside: u8,
 }
 
-type Notes = Arc<Mutex<Vec<Answer>>>;
+/// What was heard since the last [`Watch::clear`].
+#[derive(Debug, Default)]
+pub struct Heard {
+    /// In order.
+    pub answers: Vec<Answer>,
+    /// What the walk submitted, before triangles were judged one by one; nothing without tests.
+    pub submitted: Option<Vec<(u32, u32)>>,
+}
 
-/// The answers since the last [`Watch::clear`], in order.
+type Notes = Arc<Mutex<Heard>>;
+
 pub struct Watch {
     notes: Notes,
 }
@@ -43,16 +51,16 @@ impl Watch {
     }
 
     pub fn clear(&self) {
-        lock(&self.notes).clear();
+        *lock(&self.notes) = Heard::default();
     }
 
-    pub fn read<T>(&self, with: impl FnOnce(&[Answer]) -> T) -> T {
+    pub fn read<T>(&self, with: impl FnOnce(&Heard) -> T) -> T {
         with(&lock(&self.notes))
     }
 }
 
 /// Never contended; a panic of the lab leaves plain data behind.
-fn lock(notes: &Notes) -> MutexGuard<'_, Vec<Answer>> {
+fn lock(notes: &Notes) -> MutexGuard<'_, Heard> {
     notes.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -91,7 +99,12 @@ impl Test for Watched {
 
     fn judge(&mut self, hierarchy: &Hierarchy, block: u32, live: u8, carry: u8, tally: &mut Tally) -> Verdict {
         let verdict = self.inner.judge(hierarchy, block, live, carry, tally);
-        lock(&self.notes).push(Answer { block, test: self.number, asked: live, outside: verdict.outside & live });
+        lock(&self.notes).answers.push(Answer {
+            block,
+            test: self.number,
+            asked: live,
+            outside: verdict.outside & live,
+        });
         verdict
     }
 
@@ -104,12 +117,14 @@ impl Test for Watched {
             // Lanes that are not live may come back set.
             let asked = hierarchy.links[block as usize].live & !before;
             if asked != 0 {
-                notes.push(Answer { block, test: self.number, asked, outside: *after & asked });
+                notes.answers.push(Answer { block, test: self.number, asked, outside: *after & asked });
             }
         }
     }
 
     fn filter(&mut self, hierarchy: &Hierarchy, list: &mut DrawList, tally: &mut Tally) {
+        // The first of them has the list as the walk left it.
+        lock(&self.notes).submitted.get_or_insert_with(|| list.ranges.clone());
         self.inner.filter(hierarchy, list, tally);
     }
 

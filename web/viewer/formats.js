@@ -17,6 +17,7 @@ export const LOST = 3;
 export const NOT_REACHED = 0;
 export const DRAWN = 1;
 export const WENT_ON = 2;
+export const HIDDEN = 3;
 export const FIRST_CULLED = 16;
 
 export const TWO_SIDED = 1 << 24;

@@ -2,7 +2,7 @@
 // all common kinds of colour blindness (after Okabe and Ito), and what matters most,
 // lost triangles, is also said by shape: outlines and rings through walls.
 
-import { DRAWN, FIRST_CULLED, NOT_REACHED, WENT_ON } from "./formats.js";
+import { DRAWN, FIRST_CULLED, HIDDEN, NOT_REACHED, WENT_ON } from "./formats.js";
 
 export const STATE_COLOURS = ["#9aa3ab", "#e69f00", "#009e73", "#d6003b"];
 export const STATE_NAMES = ["Not submitted", "Over-submission", "Submitted, seen", "Lost"];
@@ -13,7 +13,7 @@ export const STATE_HELP = [
   "False culls: the camera sees them, and the method left them out",
 ];
 
-const DECISIONS = { [NOT_REACHED]: "#8d949b", [DRAWN]: "#009e73", [WENT_ON]: "#7c8794" };
+const DECISIONS = { [NOT_REACHED]: "#8d949b", [DRAWN]: "#009e73", [WENT_ON]: "#7c8794", [HIDDEN]: "#b5651d" };
 const TESTS = ["#56b4e9", "#cc79a7", "#0072b2", "#d55e00", "#8b6bd6", "#b8a000", "#a0522d", "#4a5a9c"];
 
 export const decisionColour = (byte) =>
@@ -23,6 +23,7 @@ export function decisionName(byte, tests) {
   if (byte === NOT_REACHED) return "Not reached";
   if (byte === DRAWN) return "Drawn";
   if (byte === WENT_ON) return "Went on to children";
+  if (byte === HIDDEN) return "Hidden: the walk saw no way there";
   return `Culled: ${tests[byte - FIRST_CULLED] ?? `test ${byte - FIRST_CULLED}`}`;
 }
 

@@ -2,7 +2,7 @@
 // the same time the table of the frame's numbers.
 
 import { button, checkbox, el, number, percent, select, slider } from "./dom.js";
-import { DRAWN, FIRST_CULLED, LOST, NOT_REACHED, SEEN, UNSEEN, WENT_ON } from "./formats.js";
+import { DRAWN, FIRST_CULLED, HIDDEN, LOST, NOT_REACHED, SEEN, UNSEEN, WENT_ON } from "./formats.js";
 import { UNSUBMITTED } from "./look.js";
 import { decisionColour, decisionName, STATE_COLOURS, STATE_HELP, STATE_NAMES } from "./palette.js";
 
@@ -112,8 +112,9 @@ export function triangleSection(look, on) {
 export function nodeSection(nodes, tests, look, on) {
   // Culled boxes first: they are what a method does.
   const shown = new Uint8Array(256).fill(1, FIRST_CULLED);
+  shown[HIDDEN] = 1;
   const depths = { least: 0, most: nodes.deepest };
-  const bytes = [DRAWN, WENT_ON, ...tests.map((_, k) => FIRST_CULLED + k), NOT_REACHED];
+  const bytes = [DRAWN, WENT_ON, ...tests.map((_, k) => FIRST_CULLED + k), HIDDEN, NOT_REACHED];
   const rows = bytes.map((byte) => {
     const count = el("td", { class: "cmv-number", text: "–" });
     const share = el("td", { class: "cmv-number cmv-share" });
@@ -146,7 +147,9 @@ export function nodeSection(nodes, tests, look, on) {
     ...(nodes.deepest > 0 ? [least.node, most.node] : []), option("Boxes also in the camera's view", "boxesInCamera"), option("Faces of the boxes", "faces"),
     option("Edges through walls", "through"));
   const update = (frame) => {
-    for (const { byte, count, share } of rows) {
+    for (const { byte, count, share, row } of rows) {
+      // Most walks leave it to the tests what is hidden.
+      if (byte === HIDDEN) row.hidden = !frame?.decisions[HIDDEN];
       count.textContent = frame ? number(frame.decisions[byte]) : "–";
       share.textContent = frame ? percent(frame.decisions[byte], nodes.count) : "";
     }

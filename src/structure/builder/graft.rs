@@ -29,12 +29,11 @@ pub fn graft(scene: &Scene, stock: &Hierarchy, scions: Vec<Scion>) -> Hierarchy 
     let mut moved = vec![0u32; stock.entries.len() + 1];
     let mut at = 0usize;
     let keep = |to: usize, at: &mut usize, h: &mut Hierarchy, moved: &mut [u32], fragments: &mut Vec<[DVec3; 3]>| {
-        for position in *at..to {
-            moved[position] = h.entries.len() as u32;
-            h.entries.push(stock.entries[position]);
-            if split {
-                fragments.push(stock.piece(scene, position as u32));
-            }
+        let new = h.entries.len() as u32..;
+        moved[*at..to].iter_mut().zip(new).for_each(|(m, new)| *m = new);
+        h.entries.extend_from_slice(&stock.entries[*at..to]);
+        if split {
+            fragments.extend((*at..to).map(|position| stock.piece(scene, position as u32)));
         }
         *at = to;
     };

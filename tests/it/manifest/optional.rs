@@ -1,7 +1,6 @@
 //! Scenes and paths that a study can go without, and folders named by variables.
 
 use super::{Folder, HEAD, MATRIX_LINES};
-use cullmark::manifest::Manifest;
 
 const OPTIONAL: &str = r#"
 [[scene]]
@@ -54,23 +53,4 @@ fn a_variable_that_is_not_set_is_named() {
     let e = errors.iter().find(|e| e.message.contains("CULLMARK_TEST_NOWHERE is not set")).expect("it is named");
     assert!(e.line.is_some() && e.key.as_deref() == Some("scene.2.file"), "{e}");
     assert!(e.help.as_deref().unwrap().contains("export CULLMARK_TEST_NOWHERE="));
-}
-
-#[test]
-fn the_studies_of_this_repository_are_without_mistakes() {
-    let folder = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("experiments");
-    let mut studies = Vec::new();
-    for dir in [folder.clone(), folder.join("stress")] {
-        let files = std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().path());
-        studies.extend(files.filter(|p| p.extension().is_some_and(|e| e == "toml")));
-    }
-    assert!(studies.len() > 10);
-    for study in studies {
-        // The one study that is of files alone may find none of them.
-        let away = |e: &cullmark::Error| e.message.contains("no scene of the study is there");
-        match Manifest::load(&study, &[]) {
-            Ok(manifest) => drop(cullmark::matrix::expand(&manifest, &Default::default()).unwrap()),
-            Err(errors) => assert!(errors.iter().all(away), "{}: {errors:?}", study.display()),
-        }
-    }
 }

@@ -301,7 +301,12 @@ fn the_experiments_of_this_repository_are_free_of_mistakes() {
             continue;
         }
         let told = |errors: Vec<cullmark::Error>| -> String { errors.iter().map(|e| format!("{e}\n")).collect() };
-        let manifest = Manifest::load(&path, &[]).unwrap_or_else(|e| panic!("{}", told(e)));
+        let manifest = match Manifest::load(&path, &[]) {
+            Ok(manifest) => manifest,
+            // A study of files alone may find none of them.
+            Err(e) if e.len() == 1 && e[0].message.contains("no scene of the study is there") => continue,
+            Err(e) => panic!("{}", told(e)),
+        };
         let matrix = expand(&manifest, &Setting::default()).unwrap_or_else(|e| panic!("{}", told(e)));
         studies.push((manifest.study.name, matrix.runs.len(), manifest.claims.len()));
     }

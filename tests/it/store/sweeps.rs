@@ -48,23 +48,28 @@ fn a_file_from_before_there_were_sweeps_is_still_read() {
         let id = store.submit(&s).await.unwrap().study_id;
         finish(&store, id, &s.policy, |_| record(100.0, "h")).await;
         let now = store.export("a").await.unwrap();
-        // Version 1 ended before the sweeps, which are here the string `[]` with its length.
+        // Version 1 ended before the sweeps and version 2 before the advice, which are here
+        // strings `[]` with their lengths.
         let head = now.len() - now[51..].len();
         let plain = zstd::stream::decode_all(&now[head..]).unwrap();
-        let (old, sweeps) = plain.split_at(plain.len() - 3);
-        assert_eq!(sweeps, b"\x02[]");
-        let payload = zstd::bulk::compress(old, 9).unwrap();
-        let mut file = now[..15].to_vec();
-        file.extend(1u32.to_le_bytes());
-        file.extend(blake3::hash(&payload).as_bytes());
-        file.extend(payload);
+        assert!(plain.ends_with(b"\x02[]\x02[]"));
+        let mut file = now.clone();
+        for (version, cut) in [(1u32, 6), (2, 3)] {
+            let payload = zstd::bulk::compress(&plain[..plain.len() - cut], 9).unwrap();
+            file = now[..15].to_vec();
+            file.extend(version.to_le_bytes());
+            file.extend(blake3::hash(&payload).as_bytes());
+            file.extend(payload);
+            let there = Store::open(&dir.path().join(format!("there{version}.db"))).await.unwrap();
+            assert_eq!(there.import(&file, None).await.unwrap().trials_added, 1);
+            let results = there.results("a").await.unwrap();
+            assert!(results.sweeps.is_empty() && results.advice.is_empty());
+            assert_eq!(there.export("a").await.unwrap(), now, "written again it is of this version");
+        }
         let there = Store::open(&dir.path().join("there.db")).await.unwrap();
-        assert_eq!(there.import(&file, None).await.unwrap().trials_added, 1);
-        assert!(there.results("a").await.unwrap().sweeps.is_empty());
-        assert_eq!(there.export("a").await.unwrap(), now, "written again it is of this version");
-        file[15] = 3;
+        file[15] = 4;
         let e = there.import(&file, None).await.unwrap_err();
-        assert!(e.to_string().contains("up to version 2"), "{e}");
+        assert!(e.to_string().contains("up to version 3"), "{e}");
     });
 }
 

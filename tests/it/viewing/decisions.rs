@@ -49,7 +49,7 @@ fn marked(h: &Hierarchy, codes: &[u8]) -> Vec<(u32, u32)> {
                     assert_ne!(links.child[lane], NONE, "a leaf does not go on");
                     ranges.push((first, own_end));
                 }
-                0 | 16.. => {}
+                0 | 3 | 16.. => {}
                 other => panic!("{other} is no mark of a node"),
             }
         }
@@ -97,6 +97,9 @@ fn marks_of_nodes_make_up_what_the_walk_submitted_and_jumping_changes_nothing() 
         let h = structure::make(&Spec::parse(&name).unwrap()).unwrap().0.build(&scene).unwrap();
         for (culling, walk) in sums().iter().flat_map(|c| WALKS.iter().map(move |w| (c, w.name))) {
             let make = || make_walk(&Spec::parse(walk).unwrap()).unwrap().0;
+            if make().refuses(&h).is_some() {
+                continue;
+            }
             for camera in [spec.camera, ortho] {
                 let mut tests = make_tests(&parse_sum(culling).unwrap()).unwrap().0;
                 tests.iter_mut().for_each(|t| _ = t.prepare(&scene, &h));
@@ -117,7 +120,7 @@ fn marks_of_nodes_make_up_what_the_walk_submitted_and_jumping_changes_nothing() 
             }
         }
     }
-    assert_eq!(marks.into_iter().collect::<Vec<_>>(), [0, 1, 2, 16, 17, 18], "every kind of mark occurred");
+    assert_eq!(marks.into_iter().collect::<Vec<_>>(), [0, 1, 2, 3, 16, 17, 18], "every kind of mark occurred");
 }
 
 /// Frames that nobody judged are shown as if they had been.
@@ -132,14 +135,14 @@ fn a_frame_that_a_walk_would_not_judge_shows_its_nodes() {
         let walk_of = |text: &str| make_walk(&Spec::parse(text).unwrap()).unwrap().0;
         let view = |walk: Box<dyn Walk>| view_of(&scene, &poses, &spec.camera, &h, "frustum", walk);
         let (mut plain, mut skipping) = (view(walk_of(walk)), view(walk_of(&format!("{walk}:{other}"))));
-        for n in 0..poses.len() {
+        for (n, pose) in poses.iter().enumerate() {
             let frame = skipping.frame(n, false).unwrap();
             if other == "still=true" {
                 assert!(frame == plain.frame(n, false).unwrap(), "{walk}:{other}, frame {n}");
             }
             let mut tests = make_tests(&parse_sum("frustum").unwrap()).unwrap().0;
             tests.iter_mut().for_each(|t| _ = t.prepare(&scene, &h));
-            let view = View::new(&spec.camera, &poses[n]);
+            let view = View::new(&spec.camera, pose);
             let want = walked(&view, &h, &mut tests, walk_of(&format!("{walk}:{other}")).as_mut());
             assert_eq!(marked(&h, &Frame::read(&frame).nodes), want, "{walk}:{other}, frame {n}");
         }
