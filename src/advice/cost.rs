@@ -7,14 +7,16 @@
 
 use super::probe::Counts;
 
-/// Nanoseconds of one unit of each counter.
+/// Nanoseconds of one unit of each counter. Of 450 measurements on five scenes, half of them
+/// held out, the median relative error was 16 %. Plane and mask tests got nothing: eight nodes
+/// are judged at once, whatever rejects them.
 pub const COSTS: &[(&str, f64)] = &[
-    ("frames", 250.0),
-    ("nodes_visited", 4.0),
-    ("plane_tests", 0.4),
-    ("mask_tests", 1.0),
-    ("triangle_tests", 1.2),
-    ("ranges", 2.0),
+    ("frames", 7.4),
+    ("nodes_visited", 14.0),
+    ("nodes_scanned", 1.4),
+    ("triangle_tests", 0.33),
+    ("ranges", 1.7),
+    ("cells_reached", 290.0),
 ];
 
 /// Culling time of a frame whose mean counts are `counts`.

@@ -136,6 +136,12 @@ impl Built {
         let mean = |sum: u64| sum as f64 / views.len() as f64;
         counts.work = tally.named().iter().map(|(name, _, sum)| (*name, mean(*sum))).collect();
         counts.work.insert("ranges", mean(ranges));
+        // A list is scanned by wide kernels, at a tenth of what a node of a tree costs.
+        if self.hierarchy.links.len() == self.hierarchy.root_blocks as usize {
+            let scanned = counts.work.insert("nodes_visited", 0.0).unwrap_or_default();
+            counts.work.insert("nodes_scanned", scanned);
+            counts.work.insert("plane_tests", 0.0);
+        }
         (counts.entries, counts.draw_calls) = (mean(entries), mean(calls));
         counts
     }
