@@ -113,8 +113,11 @@ pub struct RunResult {
     pub trials: Vec<TrialSummary>,
     /// Median over trials, frame by frame; empty when withheld.
     pub cull_ns: Vec<f64>,
-    /// Identical between trials.
+    /// Identical between trials. Triangles are distinct ones.
     pub triangles: Vec<f64>,
+    /// What is drawn: triangles that a structure replicates or splits count each time.
+    #[serde(default)]
+    pub entries: Vec<f64>,
     pub draw_calls: Vec<f64>,
     pub nodes_visited: Vec<f64>,
     /// Per-trial `cull_ns`, for bands and the bootstrap.
@@ -138,6 +141,11 @@ pub struct TrialSummary {
 }
 
 impl RunResult {
+    /// Triangles that are drawn frame by frame, copies and pieces each counted.
+    pub fn drawn(&self) -> &[f64] {
+        if self.entries.len() == self.triangles.len() { &self.entries } else { &self.triangles }
+    }
+
     pub fn scene(&self) -> &str {
         &self.spec.scene.name
     }

@@ -53,6 +53,7 @@ pub static METRICS: &[Metric] = &[
     metric("frame_ms_model", "ms", 2, "modelled time a frame: culling + indices + draw calls, mean over the path"),
     metric("largest_blob_px", "px", 0, "largest connected hole in any judged frame"),
     metric("mean_draw_calls", "calls", 0, "draw calls a frame"),
+    metric("mean_entries", "triangles", 0, "triangles drawn a frame, copies and pieces each"),
     metric("mean_nodes_visited", "nodes", 0, "nodes judged a frame"),
     metric("mean_triangles", "triangles", 0, "triangles submitted a frame"),
     metric("over_submission", "", 0, "submitted over visible triangles, mean over judged frames"),

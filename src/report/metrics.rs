@@ -125,6 +125,9 @@ pub static METRICS: &[Metric] = &[
         ..metric("mad_total_cull_ms", "ms", Measured, "median absolute deviation of the total over trials", totals)
     },
     metric("mean_draw_calls", "calls", Counted, "draw calls a frame", |r| average(&r.draw_calls)),
+    metric("mean_entries", "triangles", Counted, "triangles drawn a frame, copies and pieces each", |r| {
+        average(r.drawn())
+    }),
     metric("mean_nodes_visited", "nodes", Counted, "nodes judged a frame", |r| average(&r.nodes_visited)),
     metric("mean_triangles", "triangles", Counted, "triangles submitted a frame", |r| average(&r.triangles)),
     metric("median_frame_us", "µs", Measured, "culling time of the median frame", |r| {
@@ -263,7 +266,8 @@ fn modelled(run: &RunResult) -> Vec<f64> {
     if run.triangles.is_empty() || run.triangles.len() != run.draw_calls.len() {
         return Vec::new();
     }
-    let frames = run.triangles.iter().zip(&run.draw_calls);
+    // Copies are drawn, too.
+    let frames = run.drawn().iter().zip(&run.draw_calls);
     let render: f64 = frames.map(|(t, d)| run.spec.model.render_ns(*t, *d)).sum();
     let scale = run.spec.model.cull_scale;
     totals(run).iter().map(|cull| scale * cull + render / 1e6).collect()

@@ -31,7 +31,7 @@ fn per_trial(run: &RunResult, of: fn(&Frames) -> Option<f64>) -> Vec<f64> {
 
 /// Modelled time of every frame whose culling took `cull_ns`.
 pub fn model_ns(run: &RunResult, cull_ns: &[f64]) -> Vec<f64> {
-    let drawn = run.triangles.iter().zip(&run.draw_calls).map(|(t, d)| run.spec.model.render_ns(*t, *d));
+    let drawn = run.drawn().iter().zip(&run.draw_calls).map(|(t, d)| run.spec.model.render_ns(*t, *d));
     cull_ns.iter().zip(drawn).map(|(cull, draw)| run.spec.model.cull_scale * cull + draw).collect()
 }
 

@@ -85,6 +85,10 @@ pub fn document(content: &Content) -> String {
         let body = format!("<p>{FRONTIER}</p>\n{body}{}", table(content, "frontier"));
         out += &section("frontier-section", "Run time against error", &body);
     }
+    let advice = table(content, "advice");
+    if !advice.is_empty() {
+        out += &section("advice-section", "Advice, and what following it costs", &advice);
+    }
     out += &section("errors-section", "Errors", &table(content, "errors"));
     let body = figures(content, &["memory"]) + &table(content, "memory");
     out += &section("memory-section", "Memory", &body);
@@ -145,8 +149,11 @@ fn header(content: &Content) -> String {
         ("times-section", "Time and work"),
         ("rates-section", "Frames per second"),
         ("frontier-section", "Time against error"),
-        ("errors-section", "Errors"),
     ]);
+    if !content.grid.results.advice.is_empty() {
+        links.push(("advice-section", "Advice"));
+    }
+    links.push(("errors-section", "Errors"));
     links.extend([("memory-section", "Memory"), ("build-section", "Structures")]);
     if content.again.is_some() {
         links.push(("repeatability-section", "Measured again"));

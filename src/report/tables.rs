@@ -52,6 +52,7 @@ pub fn times(grid: &Grid) -> Table {
             ("p99_frame_us", "99th percentile"),
             ("frame_ms_model", "frame, modelled"),
             ("mean_triangles", "triangles a frame"),
+            ("mean_entries", "drawn, with copies"),
             ("mean_draw_calls", "draw calls a frame"),
             ("mean_nodes_visited", "nodes a frame"),
             ("trials", "trials"),

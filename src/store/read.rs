@@ -256,6 +256,7 @@ impl Store {
             trials: best.iter().map(|t| summary(t)).collect(),
             cull_ns: median_by_frame(&trial_cull_ns),
             triangles: counted("triangles")?,
+            entries: counted("entries")?,
             draw_calls: counted("draw_calls")?,
             nodes_visited: counted("nodes_visited")?,
             trial_cull_ns,

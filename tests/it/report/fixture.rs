@@ -181,6 +181,7 @@ pub fn run(
         cull_ns,
         triangles,
         draw_calls,
+        entries: Vec::new(),
         nodes_visited: nodes,
         trial_cull_ns,
         counters: counters.map(|(k, v)| (k.to_string(), v)).into(),
