@@ -167,56 +167,25 @@ impl Column {
     }
 }
 
-/// `primitive=sphere`.
-pub struct Spheres(Column);
+/// `primitive=sphere`, or with `POINT` its centre alone, of which nothing is ever inside.
+pub struct Round<const POINT: bool>(Column);
 
-impl Spheres {
-    pub fn new(kernels: SphereKernels) -> Spheres {
-        Spheres(Column::new(kernels))
-    }
-}
-
-impl PlaneTest for Spheres {
-    const CLASS: Class = Class::Conservative;
-    const BOXES: bool = false;
-
-    fn prepare(&mut self, hierarchy: &Hierarchy) -> usize {
-        self.0.prepare(hierarchy, false)
-    }
-
-    fn begin(&mut self, view: &View, hierarchy: &Hierarchy) {
-        self.0.frame = FramePlanes::new(view, hierarchy.origin);
-    }
-
-    fn planes(&self) -> usize {
-        self.0.frame.count
-    }
-
-    #[inline]
-    fn block(&mut self, _: &Hierarchy, ask: &Ask, masks: &mut PlaneMasks, _: &mut Tally) {
-        self.0.judge(ask, ask.inside, masks);
-    }
-
-    fn flat(&mut self, _: &Hierarchy, live: &[u8], outside: &mut [u8], _: &mut Tally) -> Work {
-        self.0.flat(live, outside)
-    }
-}
-
+pub type Spheres = Round<false>;
 /// `primitive=point`.
-pub struct Points(Column);
+pub type Points = Round<true>;
 
-impl Points {
-    pub fn new(kernels: SphereKernels) -> Points {
-        Points(Column::new(kernels))
+impl<const POINT: bool> Round<POINT> {
+    pub fn new(kernels: SphereKernels) -> Round<POINT> {
+        Round(Column::new(kernels))
     }
 }
 
-impl PlaneTest for Points {
-    const CLASS: Class = Class::Aggressive;
+impl<const POINT: bool> PlaneTest for Round<POINT> {
+    const CLASS: Class = if POINT { Class::Aggressive } else { Class::Conservative };
     const BOXES: bool = false;
 
     fn prepare(&mut self, hierarchy: &Hierarchy) -> usize {
-        self.0.prepare(hierarchy, true)
+        self.0.prepare(hierarchy, POINT)
     }
 
     fn begin(&mut self, view: &View, hierarchy: &Hierarchy) {
@@ -229,15 +198,18 @@ impl PlaneTest for Points {
 
     #[inline]
     fn block(&mut self, _: &Hierarchy, ask: &Ask, masks: &mut PlaneMasks, _: &mut Tally) {
-        self.0.judge(ask, false, masks);
+        self.0.judge(ask, ask.inside && !POINT, masks);
     }
 
     fn flat(&mut self, _: &Hierarchy, live: &[u8], outside: &mut [u8], _: &mut Tally) -> Work {
         self.0.flat(live, outside)
     }
 
-    /// Of the very point that is judged; nothing is ever inside.
-    fn far_planes(&self, halves: &Halves, _: &Hierarchy, block: u32) -> Option<Far> {
-        Some(halves.of_points(&self.0.spheres[block as usize].centre))
+    fn far_planes(&self, halves: &Halves, hierarchy: &Hierarchy, block: u32) -> Option<Far> {
+        // A point is judged by the centre as it is stored, a sphere holds its box.
+        Some(match POINT {
+            true => halves.of_points(&self.0.spheres[block as usize].centre),
+            false => halves.of_boxes(&hierarchy.bounds[block as usize]),
+        })
     }
 }
