@@ -231,10 +231,9 @@ fn predict(
     }
 }
 
-/// The first `count` of different structure; then, if there are not so many, any.
+/// The best predicted.
 fn short_list(considered: &[Considered], count: usize) -> Vec<usize> {
-    let ranked: Vec<usize> = (0..considered.len()).filter(|i| considered[*i].predicted_ns.is_some()).collect();
-    ranked.into_iter().take(count.max(1)).collect()
+    (0..considered.len()).filter(|i| considered[*i].predicted_ns.is_some()).take(count.max(1)).collect()
 }
 
 /// What speaks for the choice, in figures of the timed probe.
@@ -253,8 +252,7 @@ fn reasons(question: &Question, considered: &[Considered], chosen: usize) -> Vec
         considered.iter().enumerate().filter(|(i, _)| *i != chosen).filter_map(|(_, c)| Some((c, c.timed.as_ref()?)));
     for (rival, t) in rivals {
         let ratio = t.objective_ns / own.objective_ns;
-        let what = |mine: f64, theirs: f64| theirs - mine;
-        let (cull, draw) = (what(own.cull_ns, t.cull_ns), what(own.draw_ns, t.draw_ns));
+        let (cull, draw) = (question.model.cull_scale * (t.cull_ns - own.cull_ns), t.draw_ns - own.draw_ns);
         let cause = if cull.abs() > draw.abs() { "culling" } else { "drawing" };
         let tie = t.low_ns <= own.high_ns && own.low_ns <= t.high_ns;
         let close = if tie { ", within the noise of the probe" } else { "" };

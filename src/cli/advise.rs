@@ -28,7 +28,9 @@ pub struct Args {
     options: SceneOptions,
     /// Advise on every scene and path of a finished study, among its combinations, and keep
     /// the advice with it: its report then tells the regret against the full matrix
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["scene", "path", "structures", "cullings"])]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["scene", "path",
+        "structures", "cullings", "up", "scale", "offset_m", "winding", "weld", "fov_y_deg", "ortho_height_m", "aspect",
+        "near_m", "far_m", "index_ns", "draw_call_ns"])]
     study: Option<String>,
     /// Database of that study
     #[arg(long, value_name = "FILE", default_value = store::DEFAULT_DB, requires = "study")]
