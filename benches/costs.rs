@@ -73,7 +73,8 @@ fn main() {
 fn measure(name: &str, scene: &Scene, poses: &[cullmark::math::Pose], rows: &mut Vec<(String, Counts, f64)>) {
     let frames = probe::frames(poses.len(), 64);
     let views: Vec<View> = frames.iter().map(|f| View::new(&Camera::default(), &poses[*f as usize])).collect();
-    let all = candidates::product(candidates::STRUCTURES, candidates::CULLINGS).expect("known names");
+    let mut all = candidates::product(candidates::STRUCTURES, candidates::CULLINGS).expect("known names");
+    all.extend(candidates::with_mailboxes(&all));
     for structure in candidates::STRUCTURES {
         let spec = cullmark::structure::make(&Spec::parse(structure).expect("a spec")).expect("a structure").1;
         let mine: Vec<_> = all.iter().filter(|c| c.structure == spec).collect();

@@ -4,7 +4,7 @@ use super::Combination;
 use super::features::Features;
 use crate::culling::{self, usual_walk};
 use crate::error::Result;
-use crate::registry::{Spec, parse_sum};
+use crate::registry::{Spec, Value, parse_sum};
 use crate::structure;
 
 /// Structures worth a look: flat ones, trees of several depths, and what Silva (2009) and
@@ -49,6 +49,19 @@ pub fn product<T: AsRef<str>>(structures: &[T], cullings: &[T]) -> Result<Vec<Co
     }
     Ok(out)
 }
+
+/// What of `all` runs over copies of triangles, and how to draw each copy once.
+pub fn with_mailboxes(all: &[Combination]) -> Vec<Combination> {
+    let replicates = |s: &Spec| s.kind == "portal_octree" || s.params.get("policy") == Some(&Value::Text("R".into()));
+    let asked = |c: &Combination| !c.culling.is_empty() && c.culling.iter().all(|t| t.kind != MAILBOX);
+    let once = |c: &Combination| {
+        let culling = c.culling.iter().cloned().chain([Spec::new(MAILBOX)]).collect();
+        Combination { culling, ..c.clone() }
+    };
+    all.iter().filter(|c| replicates(&c.structure) && asked(c)).map(once).collect()
+}
+
+const MAILBOX: &str = "mailbox";
 
 /// Scenes with more triangles are not cut into pieces to find out whether that pays.
 const PIECES_MAX: usize = 500_000;

@@ -17,6 +17,7 @@ pub const COSTS: &[(&str, f64)] = &[
     ("triangle_tests", 0.33),
     ("ranges", 1.7),
     ("cells_reached", 290.0),
+    ("notes_read", 1.5),
 ];
 
 /// Culling time of a frame whose mean counts are `counts`.

@@ -48,7 +48,7 @@ impl Counts {
     /// Of a sample to the whole: what goes with triangles grows, nodes stay.
     pub fn scaled(mut self, one_in: f64) -> Counts {
         self.entries *= one_in;
-        for name in ["triangle_tests", "predicates"] {
+        for name in ["triangle_tests", "predicates", "notes_read", "copies_dropped"] {
             if let Some(x) = self.work.get_mut(name) {
                 *x *= one_in;
             }

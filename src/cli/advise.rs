@@ -99,10 +99,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let named = |given: &'static [&'static str], own: &[String]| -> Vec<String> {
         if own.is_empty() { given.iter().map(ToString::to_string).collect() } else { own.to_vec() }
     };
-    let candidates = candidates::product(
+    let mut candidates = candidates::product(
         &named(candidates::STRUCTURES, &args.structures),
         &named(candidates::CULLINGS, &args.cullings),
     )?;
+    if args.cullings.is_empty() {
+        candidates.extend(candidates::with_mailboxes(&candidates));
+    }
     let scene = load::load(&spec)?;
     let poses = walkthrough::load(&path, &spec, &scene)?;
     let advice = on_the_lane(&Question {

@@ -38,6 +38,7 @@ pub mod frustum_world;
 #[cfg(target_arch = "x86_64")]
 pub mod frustum_x86;
 pub mod look_at;
+pub mod mailbox;
 pub mod normal_cone;
 pub mod normal_mask;
 mod normal_mask_local;
@@ -233,6 +234,7 @@ pub static TESTS: &[Entry<dyn Test>] = &[
     back_face::ENTRY,
     frustum::ENTRY,
     look_at::ENTRY,
+    mailbox::ENTRY,
     normal_cone::ENTRY,
     normal_mask::ENTRY,
     octant_mask::ENTRY,

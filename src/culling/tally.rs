@@ -60,6 +60,10 @@ counters! {
     cells_reached: "cells",
     /// Openings between cells that were projected to the screen.
     portals_tested: "portals",
+    /// Entries with copies elsewhere, looked up in a mailbox.
+    notes_read: "entries",
+    /// Those of them whose triangle was drawn already.
+    copies_dropped: "entries",
 }
 
 impl Tally {

@@ -38,7 +38,7 @@ fn structures() -> Vec<String> {
     all
 }
 
-const CULLINGS: [&str; 30] = [
+const CULLINGS: [&str; 32] = [
     "none",
     "frustum",
     "frustum:plane_mask=false",
@@ -69,12 +69,15 @@ const CULLINGS: [&str; 30] = [
     "frustum:last_plane=true,octant=true,sat=true",
     "normal_mask:saturation=0.5",
     "octant_mask:saturation=0.5",
+    "mailbox",
+    "frustum+mailbox+back_face",
 ];
 
 /// Walks that skip what a scene does not need, and tests to be skipped.
 const SKIPPING: [&str; 4] =
     ["depth_first:small=60,still=true", "flat:still=true", "depth_first:whole_below=100000", "flat:whole_below=100000"];
-const SKIPPED: [&str; 3] = ["frustum+normal_mask", "frustum:octant=true+back_face:arithmetic=filtered", "look_at"];
+const SKIPPED: [&str; 4] =
+    ["frustum+normal_mask", "frustum:octant=true+back_face:arithmetic=filtered", "look_at", "frustum+mailbox"];
 
 /// Every culling with every walk over the structure, then the skipping ones.
 fn methods(structure: &str) -> Vec<(&'static str, &'static str)> {
