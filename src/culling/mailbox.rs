@@ -136,7 +136,7 @@ mod tests {
             mailbox.frame = u32::MAX - 3;
             for round in 0..8 {
                 let mut list = DrawList::default();
-                let kept = |p: u32| round == 0 || (p / 7 + round) % 3 != 0;
+                let kept = |p: u32| round == 0 || !(p / 7 + round).is_multiple_of(3);
                 (0..entries as u32).filter(|p| kept(*p)).for_each(|p| list.push(p, p + 1));
                 list.compacted = round % 2 == 1;
                 let before = list.clone();
