@@ -5,6 +5,10 @@
 //! type or a value out of range is found at expansion, before anything runs,
 //! and so that a new structure or test needs no change of the manifest.
 
+mod param;
+
+pub use param::{Default, Param};
+
 use crate::error::{Error, Result, did_you_mean};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -113,17 +117,15 @@ impl Spec {
             out.params.insert(key.clone(), param.check(value)?);
         }
         for param in params {
-            match param.default {
-                Default::Axis(_) => {}
-                Default::Later(_) => {
-                    if out.params.get(param.name) == Some(&param.default.value()) {
-                        out.params.remove(param.name);
-                    }
-                }
-                _ => {
-                    out.params.entry(param.name.to_string()).or_insert_with(|| param.default.value());
-                }
+            if matches!(param.default.plain(), Default::Axis(_)) {
+            } else if !param.default.is_later() {
+                out.params.entry(param.name.to_string()).or_insert_with(|| param.default.value());
+            } else if out.params.get(param.name) == Some(&param.default.value()) {
+                out.params.remove(param.name);
             }
+        }
+        for param in params {
+            param.is_asked_for(&out, params)?;
         }
         Ok(out)
     }
@@ -210,91 +212,6 @@ pub fn format_sum(parts: &[Spec]) -> String {
     parts.iter().map(Spec::to_string).collect::<Vec<_>>().join("+")
 }
 
-/// A declared parameter.
-#[derive(Debug)]
-pub struct Param {
-    pub name: &'static str,
-    pub default: Default,
-    pub about: &'static str,
-}
-
-/// Type, default and allowed values in one.
-#[derive(Debug)]
-pub enum Default {
-    Int {
-        value: i64,
-        min: i64,
-        max: i64,
-    },
-    Float {
-        value: f64,
-        min: f64,
-        max: f64,
-    },
-    Bool(bool),
-    /// The first choice is the default.
-    Choice(&'static [&'static str]),
-    /// Any of the others, but [`Spec::resolve`] leaves the default out, given or not: for
-    /// a parameter that came after runs were stored, whose ids must not change.
-    Later(&'static Default),
-    /// One of these names. Not given, it is taken from the axis of the same name,
-    /// and [`Spec::resolve`] leaves it out.
-    Axis(&'static [&'static str]),
-}
-
-impl Default {
-    pub fn value(&self) -> Value {
-        match self {
-            Default::Int { value, .. } => Value::Int(*value),
-            Default::Float { value, .. } => Value::Float(*value),
-            Default::Bool(b) => Value::Bool(*b),
-            Default::Choice(c) => Value::Text(c[0].to_string()),
-            Default::Later(d) => d.value(),
-            Default::Axis(_) => Value::Text("the axis' value".to_string()),
-        }
-    }
-}
-
-impl Default {
-    /// What is allowed, whenever it came.
-    pub fn plain(&self) -> &Default {
-        match self {
-            Default::Later(d) => d.plain(),
-            other => other,
-        }
-    }
-}
-
-impl Param {
-    fn check(&self, value: &Value) -> Result<Value> {
-        let name = self.name;
-        let wrong = |want: String| Err(Error::new(format!("is {value}, but must be {want}")).key(name));
-        match (self.default.plain(), value) {
-            (Default::Later(_), _) => unreachable!("`plain` looks into it"),
-            (Default::Int { min, max, .. }, Value::Int(i)) if (min..=max).contains(&i) => Ok(value.clone()),
-            (Default::Int { min, max, .. }, _) => wrong(format!("a whole number from {min} to {max}")),
-            (Default::Float { min, max, .. }, Value::Float(x)) if (min..=max).contains(&x) => Ok(value.clone()),
-            (Default::Float { min, max, .. }, Value::Int(i)) if *min <= *i as f64 && *i as f64 <= *max => {
-                Ok(Value::Float(*i as f64))
-            }
-            (Default::Float { min, max, .. }, _) => wrong(format!("a number from {min} to {max}")),
-            (Default::Bool(_), Value::Bool(_)) => Ok(value.clone()),
-            (Default::Bool(_), _) => wrong("true or false".to_string()),
-            // By its printed form, so that a choice may be a number: `sectors=8`.
-            (Default::Choice(c) | Default::Axis(c), _) if c.contains(&value.to_string().as_str()) => {
-                Ok(Value::Text(value.to_string()))
-            }
-            (Default::Choice(c) | Default::Axis(c), _) => {
-                let list = c.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
-                let near = did_you_mean(&value.to_string(), c.iter().copied());
-                let mut e = Error::new(format!("is {value}, but must be one of {list}")).key(name);
-                e.help = near.map(|n| format!("did you mean \"{n}\"?"));
-                Err(e)
-            }
-        }
-    }
-}
-
 /// One line of a registry: name, parameters and constructor of a `T`.
 pub struct Entry<T: ?Sized> {
     pub name: &'static str,
@@ -310,7 +227,7 @@ impl<T: ?Sized> Entry<T> {
     /// Makes what `resolved`, a resolved spec, says.
     pub fn build(&self, resolved: &Spec) -> Box<T> {
         let mut all = resolved.clone();
-        for param in self.params.iter().filter(|p| matches!(p.default, Default::Later(_))) {
+        for param in self.params.iter().filter(|p| p.default.is_later()) {
             all.params.entry(param.name.to_string()).or_insert_with(|| param.default.value());
         }
         (self.make)(&all)

@@ -2,9 +2,9 @@
 
 use super::Combination;
 use super::features::Features;
-use crate::culling::{self, usual_walk};
+use crate::culling::{self, mailbox, usual_walk};
 use crate::error::Result;
-use crate::registry::{Spec, Value, parse_sum};
+use crate::registry::{Spec, parse_sum};
 use crate::structure;
 
 /// Structures worth a look: flat ones, trees of several depths, and what Silva (2009) and
@@ -52,16 +52,13 @@ pub fn product<T: AsRef<str>>(structures: &[T], cullings: &[T]) -> Result<Vec<Co
 
 /// What of `all` runs over copies of triangles, and how to draw each copy once.
 pub fn with_mailboxes(all: &[Combination]) -> Vec<Combination> {
-    let replicates = |s: &Spec| s.kind == "portal_octree" || s.params.get("policy") == Some(&Value::Text("R".into()));
-    let asked = |c: &Combination| !c.culling.is_empty() && c.culling.iter().all(|t| t.kind != MAILBOX);
+    let asked = |c: &Combination| !c.culling.is_empty() && c.culling.iter().all(|t| t.kind != mailbox::NAME);
     let once = |c: &Combination| {
-        let culling = c.culling.iter().cloned().chain([Spec::new(MAILBOX)]).collect();
+        let culling = c.culling.iter().cloned().chain([Spec::new(mailbox::NAME)]).collect();
         Combination { culling, ..c.clone() }
     };
-    all.iter().filter(|c| replicates(&c.structure) && asked(c)).map(once).collect()
+    all.iter().filter(|c| mailbox::has_copies(&c.structure) && asked(c)).map(once).collect()
 }
-
-const MAILBOX: &str = "mailbox";
 
 /// Scenes with more triangles are not cut into pieces to find out whether that pays.
 const PIECES_MAX: usize = 500_000;

@@ -32,7 +32,11 @@ pub const ENTRY: Entry<dyn Test> = Entry {
         ARITHMETIC,
         Param {
             name: "form",
-            default: Allowed::Choice(&["plane", "difference"]),
+            default: Allowed::Only {
+                with: arithmetic::NAME,
+                is: &["f32_world"],
+                of: &Allowed::Choice(&["plane", "difference"]),
+            },
             about: "what f32_world evaluates: n.e + d, or n.(e - v); the others know one form",
         },
     ],

@@ -5,7 +5,8 @@ use crate::hierarchy::Hierarchy;
 /// What a frame submits: ranges of entry positions, merged when contiguous.
 #[derive(Debug, Clone, Default)]
 pub struct DrawList {
-    /// Written by the methods below, which withdraw the `stamp`.
+    /// Written by methods, which withdraw the `stamp`; who writes here directly clears
+    /// the list first.
     pub ranges: Vec<(u32, u32)>,
     /// Triangles were judged one by one, so what is drawn is an index list written
     /// anew this frame: ranges of one material follow each other in it without a gap.

@@ -45,32 +45,36 @@ pub const ENTRY: Entry<dyn Test> = Entry {
         ARITHMETIC,
         Param {
             name: "last_plane",
-            default: Allowed::Bool(false),
+            default: Allowed::Only { with: NODE_TEST, is: BOXES, of: &Allowed::Bool(false) },
             about: "test first the plane that rejected the node last (same answer, fewer plane tests)",
         },
         Param {
-            name: "node_test",
+            name: NODE_TEST,
             default: Allowed::Choice(&["box", "plane", "box_plane"]),
             about: "what stands for a node: its box, its BSP partition plane where it has one, or both",
         },
         Param {
             name: "octant",
-            default: Allowed::Later(&Allowed::Bool(false)),
+            default: Allowed::Only { with: NODE_TEST, is: BOXES, of: &Allowed::Later(&Allowed::Bool(false)) },
             about: "only the planes on whose side of the view a box has its centre are tested (same answer)",
         },
         Param {
             name: "plane_mask",
-            default: Allowed::Bool(true),
+            default: Allowed::Only { with: NODE_TEST, is: BOXES, of: &Allowed::Bool(true) },
             about: "planes that a node is inside of are not tested for its children (same answer)",
         },
         Param {
             name: PRIMITIVE,
-            default: Allowed::Later(&Allowed::Choice(&[BOX, "sphere", "point"])),
+            default: Allowed::Only {
+                with: NODE_TEST,
+                is: BOXES,
+                of: &Allowed::Later(&Allowed::Choice(&[BOX, "sphere", "point"])),
+            },
             about: "what stands for a node's extent: its box, the sphere around that, or its middle alone (aggressive)",
         },
         Param {
             name: "sat",
-            default: Allowed::Later(&Allowed::Bool(false)),
+            default: Allowed::Only { with: NODE_TEST, is: BOXES, of: &Allowed::Later(&Allowed::Bool(false)) },
             about: "boxes that planes do not decide are tested on all separating axes: exact for single boxes",
         },
     ],
@@ -98,6 +102,9 @@ pub const ENTRY: Entry<dyn Test> = Entry {
     },
 };
 
+const NODE_TEST: &str = "node_test";
+/// Node tests that ask about boxes.
+const BOXES: &[&str] = &[BOX, "box_plane"];
 const PRIMITIVE: &str = "primitive";
 const BOX: &str = "box";
 

@@ -16,8 +16,15 @@ use super::triangle_words::WORD;
 use super::*;
 use crate::hierarchy::NONE;
 
+pub const NAME: &str = "mailbox";
+
+/// Whether a resolved structure puts triangles into several leaves.
+pub fn has_copies(structure: &Spec) -> bool {
+    structure.kind == "portal_octree" || structure.params.get("policy") == Some(&Value::Text("R".into()))
+}
+
 pub const ENTRY: Entry<dyn Test> = Entry {
-    name: "mailbox",
+    name: NAME,
     about: "copies of a triangle that several cells hold are drawn once (replicated structures)",
     revision: 1,
     params: &[],

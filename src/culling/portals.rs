@@ -28,6 +28,7 @@
 
 use super::descent::Descent;
 use super::portals_screen::{Rect, Screen};
+use super::skipping::{STILL, Skipping, WHOLE_BELOW};
 use super::*;
 use crate::hierarchy::portals::CLOSED;
 use crate::hierarchy::{LANES, NONE, Portals as Cells};
@@ -37,12 +38,16 @@ pub const ENTRY: Entry<dyn Walk> = Entry {
     name: "portals",
     about: "from the camera's cell through the openings of a portal_octree (Luebke & Georges 1995)",
     revision: 1,
-    params: &[Param {
-        name: "clip",
-        default: Allowed::Bool(true),
-        about: "see through the part of the screen that the portals so far leave; false: flood through open faces in view",
-    }],
-    make: |spec| Box::new(Portals::new(spec.bool("clip"))),
+    params: &[
+        Param {
+            name: "clip",
+            default: Allowed::Bool(true),
+            about: "see through the part of the screen that the portals so far leave; false: flood through open faces in view",
+        },
+        STILL,
+        WHOLE_BELOW,
+    ],
+    make: |spec| Box::new(Portals { skipping: Skipping::new(spec), ..Portals::new(spec.bool("clip")) }),
 };
 
 /// Parallel rays closer to a plane than this may cross it either way.
@@ -72,6 +77,7 @@ pub struct Portals {
     marks: Vec<u8>,
     marked: Vec<u32>,
     descent: Descent,
+    skipping: Skipping,
 }
 
 impl Portals {
@@ -87,6 +93,7 @@ impl Portals {
             marks: Vec::new(),
             marked: Vec::new(),
             descent: Descent::default(),
+            skipping: Skipping::default(),
         }
     }
 
@@ -296,8 +303,20 @@ impl Walk for Portals {
         })
     }
 
+    fn reset(&mut self) {
+        self.skipping.reset();
+    }
+
     fn remembers(&self) -> bool {
         false
+    }
+
+    fn without_judging(&mut self, view: &View, h: &Hierarchy, out: &mut DrawList, tally: &mut Tally) -> bool {
+        self.skipping.skips(view, h, out, tally)
+    }
+
+    fn done(&mut self, view: &View, out: &mut DrawList) {
+        self.skipping.keep(view, out);
     }
 
     fn run(

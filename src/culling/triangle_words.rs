@@ -21,6 +21,7 @@ impl DrawList {
     pub fn retain_words(&mut self, mut judge: impl FnMut(usize, &mut [u64])) -> u64 {
         let before = std::mem::replace(&mut self.ranges, std::mem::take(&mut self.spare));
         self.ranges.clear();
+        self.stamp = 0;
         let mut listed = 0;
         let mut words = [0u64; CHUNK];
         for (first, end) in &before {

@@ -112,11 +112,11 @@ fn check(part: &Part, axis: Option<&'static Axis>, what: &str, names: Option<&[S
 
 /// Why a parameter cannot have `value`, as a help sentence.
 fn mismatch(default: &Default, value: &Value) -> Option<String> {
-    if matches!(default, Default::Later(d) if d.value() == *value) {
+    if default.is_later() && default.value() == *value {
         return Some(format!("{value} is the default, which parts do not name: leave the condition out"));
     }
     match (default.plain(), value) {
-        (Default::Later(_), _) => unreachable!("`plain` looks into it"),
+        (Default::Later(_) | Default::Only { .. }, _) => unreachable!("`plain` looks into it"),
         (Default::Int { min, max, .. }, Value::Int(i)) if (min..=max).contains(&i) => None,
         (Default::Int { min, max, .. }, _) => Some(format!("it is a whole number from {min} to {max}")),
         (Default::Float { .. }, Value::Int(_) | Value::Float(_)) => None,

@@ -2,6 +2,7 @@
 //! thousand of them compare and hash quickly.
 
 use crate::claim::{Selection, Selector};
+use crate::culling::mailbox;
 use crate::error::Error;
 use crate::manifest::axes::{AXES, AxisValue};
 use crate::manifest::source::Mistakes;
@@ -256,6 +257,14 @@ static IMPOSSIBLE: &[Impossible] = &[
         },
         why: "only `bsp` has partition planes for `node_test` to judge by",
         help: "keep node_test = \"box\" for other structures",
+    },
+    Impossible {
+        strikes: |structure, culling, _| {
+            let strikes = culling.iter().any(|t| t.kind == mailbox::NAME) && !mailbox::has_copies(structure);
+            strikes.then(|| format!("structure = \"{}\", culling = \"{}+*\"", structure.kind, mailbox::NAME))
+        },
+        why: "it holds each triangle once, so that `mailbox` has no copies to leave out",
+        help: "give `mailbox` to `portal_octree` and to policy \"R\" alone, in an [[include]]",
     },
     Impossible {
         strikes: |structure, _, walk| {

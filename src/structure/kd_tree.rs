@@ -51,17 +51,33 @@ pub const ENTRY: Entry<dyn Structure> = Entry {
         },
         Param {
             name: "traversal_cost",
-            default: Default::Float { value: 15.0, min: 0.0, max: 1e6 },
+            default: Default::Only {
+                with: "split",
+                is: &["sah"],
+                of: &Default::Float { value: 15.0, min: 0.0, max: 1e6 },
+            },
             about: "K_T of the heuristic: asking about a node",
         },
         Param {
             name: "triangle_cost",
-            default: Default::Float { value: 20.0, min: 0.001, max: 1e6 },
+            default: Default::Only {
+                with: "split",
+                is: &["sah"],
+                of: &Default::Float { value: 20.0, min: 0.001, max: 1e6 },
+            },
             about: "K_I of the heuristic: a triangle in a leaf",
         },
         Param {
             name: "empty_bonus",
-            default: Default::Float { value: 0.2, min: 0.0, max: 1.0 },
+            default: Default::Only {
+                with: "split",
+                is: &["sah"],
+                of: &Default::Only {
+                    with: "policy",
+                    is: &["R", "S"],
+                    of: &Default::Float { value: 0.2, min: 0.0, max: 1.0 },
+                },
+            },
             about: "share of the cost that a plane saves by cutting off empty space",
         },
         Param {

@@ -17,7 +17,7 @@
 use super::Structure;
 use super::builder::morton::{Lattice, interleave, radix_sort};
 use super::builder::{self, Node, cut, facing};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::hierarchy::Hierarchy;
 use crate::math::{Aabb, Box32, DVec3};
 use crate::registry::{Default, Entry, Param};
@@ -51,7 +51,12 @@ pub const ENTRY: Entry<dyn Structure> = Entry {
         },
         Param {
             name: "leaves",
-            default: Default::Later(&Default::Choice(&["whole", "facing"])),
+            // Leaves of whole triangles, each in one of them.
+            default: Default::Only {
+                with: "policy",
+                is: &["L", "E"],
+                of: &Default::Later(&Default::Choice(&["whole", "facing"])),
+            },
             about: "facing: divided once more, by where their triangles face (policies L and E)",
         },
     ],
@@ -98,11 +103,6 @@ pub struct Octree {
 impl Structure for Octree {
     fn build(&self, scene: &Scene) -> Result<Hierarchy> {
         let root = self.root_cell(scene);
-        if self.by_facing && matches!(self.policy, Policy::Replicate | Policy::Split) {
-            return Err(Error::new("leaves=\"facing\" needs leaves of whole triangles, each in one of them")
-                .key("leaves")
-                .help("take policy \"L\" or \"E\""));
-        }
         match self.policy {
             Policy::Loose => Ok(self.build_loose(scene, &root)),
             Policy::Enclose => Ok(self.build_enclosing(scene, &root)),

@@ -157,6 +157,27 @@ fn nothing_is_lost_far_from_the_origin_and_without_walls() {
     }
 }
 
+#[test]
+fn nothing_is_lost_of_degenerate_scenes() {
+    for scene in crate::structures::scenes().iter().filter(|s| s.len() < 1000 && !s.is_empty()) {
+        let b = scene.bounds();
+        let reach = b.size().max_element().max(1.0);
+        let around = [DVec3::ZERO, DVec3::new(0.7, -0.6, 0.5), DVec3::new(-0.9, 0.0, 0.0), DVec3::new(0.0, 0.0, 0.4)];
+        let looking = |(i, at): (usize, &DVec3)| {
+            let eye = b.centre() + *at * reach;
+            facing(eye, if i == 0 { DVec3::X } else { b.centre() - eye })
+        };
+        let poses: Vec<Pose> = around.iter().enumerate().map(looking).collect();
+        for structure in STRUCTURES {
+            let h = build(structure, scene);
+            for camera in cameras(reach) {
+                let truth = truth_of(scene, &camera, &poses, &SMALL);
+                face_the_oracle(scene, &h, &camera, &poses, &truth, &format!("{} {structure}", scene.name));
+            }
+        }
+    }
+}
+
 /// Where one ray goes, cell by cell, until a face is closed to it: nodes it meets.
 fn march(h: &Hierarchy, cells: &Portals, view: &View, x: f64, y: f64) -> Vec<u32> {
     let aside = view.right * (x * view.half_width) + view.up * (y * view.half_height);

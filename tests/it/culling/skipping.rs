@@ -119,7 +119,9 @@ fn small_subtrees_are_submitted_whole() {
 #[test]
 fn while_the_camera_stands_still_the_list_is_kept() {
     for (scene, views) in worlds() {
-        for (h, walk) in [(tree(&scene, 8, 2), "depth_first"), (list(&scene, 6), "flat")] {
+        let spec = Spec::parse("portal_octree:depth=3").unwrap();
+        let cells = cullmark::structure::make(&spec).unwrap().0.build(&scene).unwrap();
+        for (h, walk) in [(tree(&scene, 8, 2), "depth_first"), (list(&scene, 6), "flat"), (cells, "portals")] {
             for culling in ["frustum:last_plane=true", "frustum+normal_mask+back_face", "look_at", "none"] {
                 let mut plain = Run::new(&scene, &h, culling, walk);
                 let mut still = Run::new(&scene, &h, culling, &format!("{walk}:still=true"));
@@ -146,6 +148,8 @@ fn while_the_camera_stands_still_the_list_is_kept() {
                 assert_eq!(still.frame(&views[3]).frames_reused, 0, "someone wrote to it");
                 still.list.retain(|_| false);
                 assert_eq!(still.frame(&views[3]).frames_reused, 0, "someone took from it");
+                still.list.retain_words(|_, words| words.fill(0));
+                assert_eq!(still.frame(&views[3]).frames_reused, 0, "someone took whole words from it");
                 assert_eq!(still.list, own);
                 // Another camera at the same pose.
                 let wider = Camera { aspect: 2.5, ..views[3].camera };
