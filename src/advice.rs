@@ -84,6 +84,16 @@ pub struct Question<'a> {
     pub turns: usize,
 }
 
+impl Question<'_> {
+    /// What a nanosecond of culling counts, and what drawing adds.
+    fn parts(&self, draw_ns: f64) -> (f64, f64) {
+        match self.objective {
+            Objective::Frame => (self.model.cull_scale, draw_ns),
+            Objective::Cull => (1.0, 0.0),
+        }
+    }
+}
+
 /// A candidate and what became of it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Considered {
@@ -107,7 +117,9 @@ pub struct Advice {
     /// Triangles of the sample, and of how many it takes one.
     pub sample_triangles: usize,
     pub one_in: u32,
+    /// Frames on which all were counted, and those on which the short list was timed.
     pub probe: Vec<u32>,
+    pub timed: Vec<u32>,
     pub considered: Vec<Considered>,
     /// Index in `considered`.
     pub chosen: usize,
@@ -136,7 +148,10 @@ pub fn advise(question: &Question) -> Result<Advice> {
     });
     let short = short_list(&considered, question.short_list);
     if short.is_empty() {
-        let why = considered.iter().find_map(|c| c.left_out.clone()).unwrap_or_default();
+        let mut why = considered.iter().find_map(|c| c.left_out.clone()).unwrap_or_default();
+        if why == LOSSY {
+            why += "; `--aggressive` lets such methods take part";
+        }
         return Err(Error::new("no candidate is left to advise on").help(why));
     }
     let mut built = Vec::new();
@@ -146,6 +161,8 @@ pub fn advise(question: &Question) -> Result<Advice> {
             Err(e) => considered[i].left_out = Some(e.to_string()),
         }
     }
+    let timed = probe::frames(question.poses.len(), probe::TIMED * question.probe_frames);
+    let views: Vec<View> = timed.iter().map(|f| View::new(&question.camera, &question.poses[*f as usize])).collect();
     probe::time(&mut built, &views, question, &mut considered);
     let best = |c: &&(usize, Built)| considered[c.0].timed.as_ref().map_or(f64::INFINITY, |t| t.objective_ns);
     let chosen = built.iter().min_by(|a, b| best(a).total_cmp(&best(b))).map(|b| b.0);
@@ -159,6 +176,7 @@ pub fn advise(question: &Question) -> Result<Advice> {
         sample_triangles: sample.scene.len(),
         one_in: sample.one_in,
         probe,
+        timed,
         considered,
         chosen,
         why,
@@ -185,6 +203,7 @@ fn predict(
     views: &[View],
     considered: &mut [Considered],
 ) {
+    let whole = sample::Sample::whole();
     let mut order: Vec<usize> = (0..considered.len()).collect();
     order.sort_by_key(|i| considered[*i].combination.structure.to_string());
     let mut last: Option<(Spec, Result<Built>)> = None;
@@ -194,16 +213,20 @@ fn predict(
             c.left_out = Some(why);
             continue;
         }
+        if question.objective == Objective::Cull && c.combination.culling.is_empty() {
+            c.left_out = Some("removes nothing: that takes no time, and is no culling".into());
+            continue;
+        }
         // What looks through walls needs all of them.
-        let (scene, one_in) = match c.combination.structure.kind.as_str() {
-            "portal_octree" => (question.scene, 1),
-            _ => (&sample.scene, sample.one_in),
+        let (scene, sample) = match c.combination.structure.kind.as_str() {
+            "portal_octree" => (question.scene, &whole),
+            _ => (&sample.scene, sample),
         };
-        let scaled = sample::scaled(&c.combination.structure, one_in);
+        let scaled = sample::scaled(&c.combination.structure, sample.one_in);
         let same = last.as_ref().is_some_and(|(spec, _)| *spec == scaled);
         if !same {
-            let whole = Combination { structure: scaled.clone(), ..c.combination.clone() };
-            last = Some((scaled, Built::new(scene, &whole)));
+            let own = Combination { structure: scaled.clone(), ..c.combination.clone() };
+            last = Some((scaled, Built::new(scene, &own)));
         }
         let outcome = match last.as_mut() {
             Some((_, Ok(built))) => built.count(scene, &c.combination, views),
@@ -214,54 +237,80 @@ fn predict(
             Err(e) => c.left_out = Some(e.to_string()),
             Ok((class, _)) if class > Class::Conservative && !question.aggressive => {
                 c.class = Some(class);
-                c.left_out = Some("may lose visible triangles".into());
+                c.left_out = Some(LOSSY.into());
             }
             Ok((class, counts)) => {
-                let counts = counts.scaled(f64::from(one_in));
-                let cull = cost::cull_ns(&counts);
-                let draw = counts.draw_ns(&question.model);
+                let counts = counts.scaled(sample);
+                let (scale, drawn) = question.parts(counts.draw_ns(&question.model));
                 c.class = Some(class);
-                c.predicted_ns = Some(match question.objective {
-                    Objective::Cull => cull,
-                    Objective::Frame => question.model.cull_scale * cull + draw,
-                });
+                c.predicted_ns = Some(scale * cost::cull_ns(&counts) + drawn);
                 c.predicted = Some(counts);
             }
         }
     }
 }
 
-/// The best predicted.
+const LOSSY: &str = "may lose visible triangles";
+
+/// The best predicted, but nothing twice: a test that removes nothing more than the sums
+/// before it did does not earn its place, and all but one are not left to one structure.
 fn short_list(considered: &[Considered], count: usize) -> Vec<usize> {
-    (0..considered.len()).filter(|i| considered[*i].predicted_ns.is_some()).take(count.max(1)).collect()
+    let count = count.max(1);
+    let most = count.div_ceil(2).max(1);
+    let close = |a: f64, b: f64| (a - b).abs() <= 0.005 * a.max(b);
+    let mut chosen: Vec<usize> = Vec::new();
+    let mut later = Vec::new();
+    for i in 0..considered.len() {
+        let (c, Some(p)) = (&considered[i], &considered[i].predicted) else { continue };
+        let kin = |j: &&usize| considered[**j].combination.structure == c.combination.structure;
+        let idle = |j: &usize| {
+            let other = considered[*j].predicted.as_ref();
+            other.is_some_and(|o| close(o.entries, p.entries) && close(o.draw_calls, p.draw_calls))
+        };
+        if chosen.iter().filter(kin).any(idle) || chosen.iter().filter(kin).count() >= most {
+            later.push(i);
+        } else if chosen.len() < count {
+            chosen.push(i);
+        }
+    }
+    let missing = count - chosen.len();
+    chosen.extend(later.into_iter().take(missing));
+    chosen.sort_unstable();
+    chosen
 }
 
-/// What speaks for the choice, in figures of the timed probe.
+/// What speaks for the choice, in figures of the timed frames.
 fn reasons(question: &Question, considered: &[Considered], chosen: usize) -> Vec<String> {
     let us = |ns: f64| format!("{:.1} us", ns / 1e3);
     let Some(own) = &considered[chosen].timed else { return Vec::new() };
+    let modelled = match question.objective {
+        Objective::Frame => format!(": {} a frame as modelled", us(own.objective_ns)),
+        Objective::Cull => String::new(),
+    };
     let mut out = vec![format!(
-        "it culls a frame in {}, and submits {:.0} triangles of {} in {:.0} draw calls: {} as modelled",
+        "it culls a frame in {}, and submits {:.0} triangles of {} in {:.0} draw calls{modelled}",
         us(own.cull_ns),
         own.counts.entries,
         question.scene.len(),
         own.counts.draw_calls,
-        us(question.model.cull_scale * own.cull_ns + own.draw_ns),
     )];
     let rivals =
         considered.iter().enumerate().filter(|(i, _)| *i != chosen).filter_map(|(_, c)| Some((c, c.timed.as_ref()?)));
     for (rival, t) in rivals {
         let ratio = t.objective_ns / own.objective_ns;
-        let (cull, draw) = (question.model.cull_scale * (t.cull_ns - own.cull_ns), t.draw_ns - own.draw_ns);
-        let cause = if cull.abs() > draw.abs() { "culling" } else { "drawing" };
-        let tie = t.low_ns <= own.high_ns && own.low_ns <= t.high_ns;
+        let (scale, drawn) = question.parts(t.draw_ns - own.draw_ns);
+        let culling = (scale * (t.cull_ns - own.cull_ns)).abs() > drawn.abs();
+        // Of the turns, and of the places that were looked at.
+        let spread = question.parts(probe::spread_ns(t, own)).1;
+        let tie = t.low_ns <= own.high_ns + spread && own.low_ns <= t.high_ns + spread;
         let close = if tie { ", within the noise of the probe" } else { "" };
-        out.push(format!(
-            "{} takes {ratio:.2} times as long{close}, mostly for {cause} ({} against {})",
-            rival.label,
-            us(if cause == "culling" { t.cull_ns } else { t.draw_ns }),
-            us(if cause == "culling" { own.cull_ns } else { own.draw_ns }),
-        ));
+        let cause = match (question.objective, culling) {
+            (Objective::Cull, _) => format!(" ({} against {})", us(t.cull_ns), us(own.cull_ns)),
+            (_, true) => format!(", mostly for culling ({} against {})", us(t.cull_ns), us(own.cull_ns)),
+            (_, false) => format!(", mostly for drawing ({} against {})", us(t.draw_ns), us(own.draw_ns)),
+        };
+        let modelled = if question.objective == Objective::Frame { " as modelled" } else { "" };
+        out.push(format!("{} takes {ratio:.2} times as long{modelled}{close}{cause}", rival.label));
     }
     out
 }

@@ -22,7 +22,7 @@ pub struct Features {
     pub axis_aligned: f64,
     /// Front faces behind a pixel: their area on the screen over the screen.
     pub depth_complexity: f64,
-    /// Share of the triangles whose box meets the view frustum.
+    /// Share of the triangles that are in view, if only in part.
     pub in_view: f64,
     /// Share of those that face the eye.
     pub facing: f64,

@@ -1,6 +1,7 @@
 //! The frames of the probe, counting work on them and timing it.
 
-use super::{Combination, Considered, Objective, Question};
+use super::sample::Sample;
+use super::{Combination, Considered, Question};
 use crate::culling::{self, Class, DrawList, Tally, Test, Walk, cull};
 use crate::error::{Error, Result};
 use crate::hierarchy::Hierarchy;
@@ -11,6 +12,10 @@ use crate::stats;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::Instant;
+
+/// So many times the frames of the probe does the short list cull: where frames differ
+/// much, which of them a probe holds decides between near rivals.
+pub const TIMED: usize = 4;
 
 /// Frames in a row: methods may remember the frame before. More of them would leave fewer
 /// places to look at, and rooms of a house differ much.
@@ -45,9 +50,12 @@ impl Counts {
         }
     }
 
-    /// Of a sample to the whole: what goes with triangles grows, nodes stay.
-    pub fn scaled(mut self, one_in: f64) -> Counts {
+    /// Of a sample to the whole: what goes with triangles or materials grows, nodes stay.
+    pub fn scaled(mut self, sample: &Sample) -> Counts {
+        let one_in = f64::from(sample.one_in);
         self.entries *= one_in;
+        let ranges = self.of("ranges").min(self.draw_calls);
+        self.draw_calls = ranges + (self.draw_calls - ranges) * sample.material_changes;
         for name in ["triangle_tests", "predicates", "notes_read", "copies_dropped"] {
             if let Some(x) = self.work.get_mut(name) {
                 *x *= one_in;
@@ -71,6 +79,9 @@ pub struct Timing {
     pub low_ns: f64,
     pub high_ns: f64,
     pub counts: Counts,
+    /// Modelled drawing by bursts of neighbouring frames: how much places differ.
+    #[serde(skip)]
+    pub draw_ns_by_burst: Vec<f64>,
     pub build_ns: f64,
     /// Structure and columns of tests.
     pub bytes: usize,
@@ -84,6 +95,7 @@ pub struct Built {
     build_ns: f64,
     test_bytes: usize,
     list: DrawList,
+    prepared: Option<Combination>,
 }
 
 impl Built {
@@ -99,6 +111,7 @@ impl Built {
             build_ns: 0.0,
             test_bytes: 0,
             list: DrawList::default(),
+            prepared: None,
         };
         built.take(scene, combination)?;
         built.build_ns = start.elapsed().as_nanos() as f64;
@@ -107,12 +120,16 @@ impl Built {
 
     /// Other tests and another walk over the same structure.
     fn take(&mut self, scene: &Scene, combination: &Combination) -> Result<()> {
+        if self.prepared.as_ref().is_some_and(|p| (&p.culling, &p.walk) == (&combination.culling, &combination.walk)) {
+            return Ok(());
+        }
         self.tests = culling::make_tests(&combination.culling)?.0;
         self.walk = culling::make_walk(&combination.walk)?.0;
         if let Some(why) = self.walk.refuses(&self.hierarchy) {
             return Err(Error::new(format!("the walk cannot run over this structure: {why}")));
         }
         self.test_bytes = self.tests.iter_mut().map(|t| t.prepare(scene, &self.hierarchy)).sum();
+        self.prepared = Some(combination.clone());
         Ok(())
     }
 
@@ -125,13 +142,20 @@ impl Built {
 
     /// One pass over `views` from a fresh start.
     pub fn pass(&mut self, views: &[View]) -> Counts {
+        self.pass_with(views, &mut |_, _| ())
+    }
+
+    /// The same; `each` gets entries and draw calls of every frame.
+    fn pass_with(&mut self, views: &[View], each: &mut dyn FnMut(u64, u64)) -> Counts {
         self.reset();
         let (mut tally, mut counts) = (Tally::default(), Counts::default());
         let (mut entries, mut calls, mut ranges) = (0, 0, 0);
         for view in views {
             self.cull(view, &mut tally);
-            entries += self.list.entry_count();
-            calls += self.list.draw_calls(&self.hierarchy);
+            let of_frame = (self.list.entry_count(), self.list.draw_calls(&self.hierarchy));
+            each(of_frame.0, of_frame.1);
+            entries += of_frame.0;
+            calls += of_frame.1;
             ranges += self.list.ranges.len() as u64;
         }
         let mean = |sum: u64| sum as f64 / views.len() as f64;
@@ -170,7 +194,15 @@ impl Built {
 
 /// Times all of `built` (each with its index in `considered`), taking turns.
 pub fn time(built: &mut [(usize, Built)], views: &[View], question: &Question, considered: &mut [Considered]) {
-    let counts: Vec<Counts> = built.iter_mut().map(|(_, b)| b.pass(views)).collect();
+    let mut counted = Vec::new();
+    for (_, b) in built.iter_mut() {
+        let mut drawn = Vec::new();
+        let counts = b.pass_with(views, &mut |entries, calls| {
+            drawn.push(question.model.render_ns(entries as f64, calls as f64));
+        });
+        let bursts = drawn.chunks(BURST).map(|b| b.iter().sum::<f64>() / b.len() as f64).collect::<Vec<f64>>();
+        counted.push((counts, bursts));
+    }
     let mut turns: Vec<Vec<f64>> = vec![Vec::new(); built.len()];
     for turn in 0..question.turns.max(1) + 1 {
         for ((_, b), turns) in built.iter_mut().zip(&mut turns) {
@@ -181,24 +213,33 @@ pub fn time(built: &mut [(usize, Built)], views: &[View], question: &Question, c
             }
         }
     }
-    for (((i, b), turns), counts) in built.iter().zip(turns).zip(counts) {
+    for (((i, b), turns), (counts, draw_ns_by_burst)) in built.iter().zip(turns).zip(counted) {
         let draw_ns = counts.draw_ns(&question.model);
-        let drawn = if question.objective == Objective::Frame { draw_ns } else { 0.0 };
-        let scale = if question.objective == Objective::Frame { question.model.cull_scale } else { 1.0 };
+        let (scale, drawn) = question.parts(draw_ns);
         let (low, high) = stats::median_ci(&turns);
-        let (low, high) = (scale * low, scale * high);
         let cull_ns = stats::median(&turns);
         considered[*i].timed = Some(Timing {
             cull_ns,
             draw_ns,
             objective_ns: scale * cull_ns + drawn,
-            low_ns: low + drawn,
-            high_ns: high + drawn,
+            low_ns: scale * low + drawn,
+            high_ns: scale * high + drawn,
             counts,
+            draw_ns_by_burst,
             build_ns: b.build_ns,
             bytes: b.hierarchy.bytes() + b.test_bytes,
         });
     }
+}
+
+/// Twice the standard error of the mean difference of two rivals' drawing over the bursts.
+pub fn spread_ns(a: &Timing, b: &Timing) -> f64 {
+    let pairs = a.draw_ns_by_burst.iter().zip(&b.draw_ns_by_burst);
+    let differences: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+    let n = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / n;
+    let squares: f64 = differences.iter().map(|d| (d - mean) * (d - mean)).sum();
+    if n < 2.0 { 0.0 } else { 2.0 * (squares / (n - 1.0) / n).sqrt() }
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! same place, so nodes and ranges come out alike and triangles k times fewer. Files keep
 //! neighbours together, so every k-th triangle is spread over the scene.
 
+use crate::hierarchy::LANES;
 use crate::registry::{Spec, Value};
 use crate::scene::Scene;
 
@@ -15,15 +16,42 @@ pub struct Sample {
     pub scene: Scene,
     /// Of how many triangles it takes one.
     pub one_in: u32,
+    /// How many more changes of material there are within the leaves of the scene than
+    /// within those of the sample; each is a draw call.
+    pub material_changes: f64,
 }
 
 impl Sample {
     pub fn of(scene: &Scene) -> Sample {
         let one_in = scene.len().div_ceil(TRIANGLES_MAX).max(1);
         let chosen: Vec<u32> = (0..scene.len() as u32).step_by(one_in).collect();
-        Sample { scene: scene.part(&chosen), one_in: one_in as u32 }
+        let mut sample = Sample { scene: scene.part(&chosen), one_in: one_in as u32, material_changes: 1.0 };
+        if one_in > 1 {
+            let of = |scene: &Scene, one_in: u32| changes(scene, one_in).max(1.0);
+            sample.material_changes = (of(scene, 1) / of(&sample.scene, sample.one_in)).max(1.0);
+        }
+        sample
+    }
+
+    /// The scene as its own sample.
+    pub fn whole() -> Sample {
+        Sample { scene: Scene::default(), one_in: 1, material_changes: 1.0 }
     }
 }
+
+/// Changes of material within the clusters of a list.
+fn changes(scene: &Scene, one_in: u32) -> f64 {
+    let spec = Spec::new("list").with("leaf_size", Value::Int(i64::from((LEAF / one_in).max(1))));
+    let list = crate::structure::make(&spec).and_then(|(list, _)| list.build(scene));
+    let Ok(h) = list else { return 0.0 };
+    let inside = |(first, end): (u32, u32)| f64::from(h.material_runs(first, end) - 1);
+    let lanes =
+        h.links.iter().flat_map(|l| (0..LANES).filter(|i| l.live >> i & 1 == 1).map(|i| (l.first[i], l.end[i])));
+    lanes.map(inside).sum()
+}
+
+/// Triangles of a usual leaf.
+const LEAF: u32 = 64;
 
 /// `structure` for a sample of one triangle in `one_in`.
 pub fn scaled(structure: &Spec, one_in: u32) -> Spec {

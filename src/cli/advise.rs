@@ -78,7 +78,7 @@ fn parse_objective(text: &str) -> Result<Objective, String> {
 }
 
 /// Times one of a short list in turn; more turns cost little and steady the median.
-const TURNS: usize = 15;
+const TURNS: usize = 5;
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for (key, ns) in [("--index-ns", args.index_ns), ("--draw-call-ns", args.draw_call_ns)] {
@@ -121,7 +121,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         turns: TURNS,
     })?;
     let text = if args.json {
-        format!("{:#}\n", serde_json::to_value(&advice)?)
+        let question = serde_json::json!({
+            "scene": spec, "path": path, "frames": poses.len(), "camera": camera, "model": model, "advice": advice,
+        });
+        format!("{question:#}\n")
     } else {
         text::of(&advice, &spec.name, &path.name, poses.len(), args.all)
     };

@@ -1,17 +1,18 @@
 //! An advice for people.
 
-use crate::advice::{Advice, Considered};
+use crate::advice::{Advice, Considered, Objective};
 
 /// The whole of it; without `all` the twelve best predicted.
 pub fn of(advice: &Advice, scene: &str, path: &str, frames: usize, all: bool) -> String {
     let f = &advice.features;
     let percent = |x: f64| format!("{:.0} %", 100.0 * x);
     let mut out = format!(
-        "{scene}: {} triangles, {path}: {frames} frames, {} of them probed\n\
+        "{scene}: {} triangles, {path}: {frames} frames, {} of them counted and {} timed\n\
          {} of the area is axis-aligned, {:.1} front faces behind a pixel, {} of the triangles in view \
          ({} of those face the eye), normals of 64 neighbours fill {} of a mask, {:.2} octree cells a triangle\n",
         f.triangles,
         advice.probe.len(),
+        advice.timed.len(),
         percent(f.axis_aligned),
         f.depth_complexity,
         percent(f.in_view),
@@ -23,9 +24,13 @@ pub fn of(advice: &Advice, scene: &str, path: &str, frames: usize, all: bool) ->
         1 => "predicted from counts on the scene itself\n\n".to_string(),
         n => format!("predicted from counts on {} triangles, one in {n}\n\n", advice.sample_triangles),
     };
+    let of = match advice.objective {
+        Objective::Frame => "modelled us",
+        Objective::Cull => "timed us",
+    };
     out += &format!(
-        "{:<54} {:>10} {:>10} {:>9} {:>10} {:>7} {:>9} {:>8}\n",
-        "combination", "predicted", "timed us", "cull us", "triangles", "calls", "build ms", "MiB"
+        "{:<54} {:>12} {:>11} {:>9} {:>10} {:>7} {:>9} {:>8}\n",
+        "combination", "predicted us", of, "culled us", "triangles", "calls", "build ms", "MiB"
     );
     let us = |ns: f64| format!("{:.1}", ns / 1e3);
     let shown = if all { advice.considered.len() } else { 12 };
@@ -77,7 +82,7 @@ fn row(c: &Considered, chosen: bool, us: &dyn Fn(f64) -> String) -> String {
         (None, None) => Default::default(),
     };
     format!(
-        "{mark} {:<52} {predicted:>10} {timed:>10} {cull:>9} {triangles:>10} {calls:>7} {build:>9} {mib:>8}\n",
+        "{mark} {:<52} {predicted:>12} {timed:>11} {cull:>9} {triangles:>10} {calls:>7} {build:>9} {mib:>8}\n",
         c.label
     )
 }
