@@ -4,6 +4,7 @@
 //! looked at: the pieces of split triangles, copies in several leaves, else none.
 
 use super::DrawList;
+use crate::hierarchy::NONE;
 
 #[derive(Debug)]
 pub struct Distinct {
@@ -19,17 +20,9 @@ pub struct Distinct {
 impl Distinct {
     /// `entries` gives the triangle of every position, below `triangles`.
     pub fn new(entries: &[u32], triangles: usize) -> Distinct {
-        let mut times = vec![0u32; triangles];
-        entries.iter().for_each(|t| times[*t as usize] += 1);
-        let mut repeated = 0;
-        // From here on the number of a triangle, instead of how often it comes.
-        for t in &mut times {
-            let many = *t > 1;
-            *t = if many { repeated } else { u32::MAX };
-            repeated += u32::from(many);
-        }
-        let of = |position: &u32| times[entries[*position as usize] as usize];
-        let positions: Vec<u32> = (0..entries.len() as u32).filter(|p| of(p) != u32::MAX).collect();
+        let (of_triangle, repeated) = number_repeated(entries, triangles);
+        let of = |position: &u32| of_triangle[entries[*position as usize] as usize];
+        let positions: Vec<u32> = (0..entries.len() as u32).filter(|p| of(p) != NONE).collect();
         let numbers = positions.iter().map(of).collect();
         Distinct { positions, numbers, seen: vec![0; repeated as usize], counts: 0 }
     }
@@ -53,6 +46,21 @@ impl Distinct {
         }
         entries - again
     }
+}
+
+/// By triangle, its number among those with several positions or [`NONE`]; and how many
+/// such triangles there are.
+pub(super) fn number_repeated(entries: &[u32], triangles: usize) -> (Vec<u32>, u32) {
+    let mut of = vec![0u32; triangles];
+    entries.iter().for_each(|t| of[*t as usize] += 1);
+    let mut repeated = 0;
+    // From here on the number of a triangle, instead of how often it comes.
+    for t in &mut of {
+        let many = *t > 1;
+        *t = if many { repeated } else { NONE };
+        repeated += u32::from(many);
+    }
+    (of, repeated)
 }
 
 #[cfg(test)]

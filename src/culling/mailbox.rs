@@ -12,6 +12,7 @@
 //! What we changed: notes are dense over the repeated triangles alone, and whole words of
 //! positions without any are passed by.
 
+use super::distinct::number_repeated;
 use super::triangle_words::WORD;
 use super::*;
 use crate::hierarchy::NONE;
@@ -56,16 +57,8 @@ impl Test for Mailbox {
         if hierarchy.fragments.is_some() || hierarchy.entries.len() == scene.len() {
             return 0;
         }
-        let mut times = vec![0u32; scene.len()];
-        hierarchy.entries.iter().for_each(|t| times[*t as usize] += 1);
-        let mut count = 0;
-        // From here on the number of a triangle, instead of how often it comes.
-        for t in &mut times {
-            let many = *t > 1;
-            *t = if many { count } else { NONE };
-            count += u32::from(many);
-        }
-        self.number = hierarchy.entries.iter().map(|t| times[*t as usize]).collect();
+        let (of_triangle, count) = number_repeated(&hierarchy.entries, scene.len());
+        self.number = hierarchy.entries.iter().map(|t| of_triangle[*t as usize]).collect();
         let bits = |numbers: &[u32]| (0..numbers.len()).fold(0, |w, i| w | u64::from(numbers[i] != NONE) << i);
         self.repeated = self.number.chunks(WORD).map(bits).collect();
         self.drawn = vec![0; count as usize];

@@ -20,6 +20,7 @@
 //! ball around the normals, found by the iteration of Badoiu & Clarkson (2003).
 
 use super::facing_columns::trusted_normal;
+use super::frustum_planes::up;
 use super::*;
 use crate::hierarchy::{LANES, NONE};
 use crate::math::DVec3;
@@ -55,7 +56,7 @@ const LEAST_COSINE: f64 = 0.1;
 /// Guard relative to distances: 16u.
 const GUARD: f64 = 16.0 / (1u32 << 24) as f64;
 /// Share of world coordinates by which a fragment may lie off its plane: some ulps of f64.
-const ULPS: f64 = 1.0 / (1u64 << 44) as f64;
+pub(super) const ULPS: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// Cones of 8 siblings. No cone: `sin_angle` is infinite.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -232,9 +233,4 @@ fn apex(
     // A normal is known within 2^-29: beside the distance of its corner that shows.
     let tilt = planes().fold(0f64, |m, (v, _)| m.max((v - apex.as_dvec3()).length())) * (-29f64).exp2();
     (apex.to_array(), up(short + slack + tilt))
-}
-
-fn up(x: f64) -> f32 {
-    let r = x as f32;
-    if f64::from(r) < x { r.next_up() } else { r }
 }

@@ -12,6 +12,7 @@
 //! farthest point of the box; a fragment of a split triangle lies off its plane by some
 //! ulps of world coordinates, for which there is an absolute part.
 
+use super::normal_cone::ULPS;
 use super::normal_mask::{Cells, GUARD};
 use crate::hierarchy::{BoundsBlock, LANES};
 use crate::math::{DVec3, View};
@@ -78,9 +79,6 @@ impl Local {
         left
     }
 }
-
-/// Share of world coordinates by which a fragment may lie off its plane: some ulps of f64.
-const ULPS: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// Lanes whose whole box the cell is averted from.
 fn averted(corners: &[(DVec3, f64); 4], lo: &[Lanes; 3], hi: &[Lanes; 3], guard: &Lanes) -> u8 {

@@ -40,6 +40,12 @@ pub struct Portals {
     pub openings: [Vec<[Opening; 2]>; 3],
 }
 
+/// The closed intervals between `lines` that meet `lo..=hi`.
+pub fn touching(lines: &[f64], lo: f64, hi: f64) -> std::ops::Range<usize> {
+    let first = lines[1..].partition_point(|p| *p < lo);
+    first..lines[..lines.len() - 1].partition_point(|p| *p <= hi).max(first)
+}
+
 impl Portals {
     /// Cells to an axis.
     pub fn side(&self) -> usize {
@@ -72,11 +78,7 @@ impl Portals {
 
     /// The closed cells of `axis` that meet `lo..=hi`; none if all lie beside it.
     pub fn touching(&self, axis: usize, lo: f64, hi: f64) -> std::ops::Range<usize> {
-        let planes = &self.planes[axis];
-        let side = self.side();
-        let first = planes[1..].partition_point(|p| *p < lo);
-        let end = planes[..side].partition_point(|p| *p <= hi);
-        first..end.max(first)
+        touching(&self.planes[axis], lo, hi)
     }
 
     /// An opening of the face above cell `at`, or any rectangle of its texels, as low

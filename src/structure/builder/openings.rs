@@ -16,7 +16,7 @@
 //! of the coordinates themselves and of exact orientations (Shewchuk 1997); rims that
 //! lie inside a third blocker count all the same, which opens too much.
 
-use crate::hierarchy::portals::{CLOSED, Opening, across, texel_line};
+use crate::hierarchy::portals::{CLOSED, Opening, across, texel_line, touching};
 use crate::math::DVec2;
 use crate::scene::Scene;
 use rayon::prelude::*;
@@ -155,12 +155,6 @@ impl<'a> Layer<'a> {
         };
         of_face.par_iter().enumerate().filter(|(_, f)| !f.0.is_empty()).map(opening).collect()
     }
-}
-
-/// The closed intervals between `lines` that meet `lo..=hi`.
-fn touching(lines: &[f64], lo: f64, hi: f64) -> std::ops::Range<usize> {
-    let first = lines[1..].partition_point(|p| *p < lo);
-    first..lines[..lines.len() - 1].partition_point(|p| *p <= hi).max(first)
 }
 
 /// What is left of the blockers' edges where none meets another from the other side.
