@@ -15,7 +15,7 @@
 //! [`super::uniform_grid`], and so is the reason why the grid is conservative.
 
 use super::Structure;
-use super::builder::axes::{Axis, Grid};
+use super::builder::axes::{Axis, Grid, walls_across};
 use super::builder::scene_bounds;
 use super::builder::straddle::{self, Policy};
 use super::uniform_grid::{LAYOUT, build_grid};
@@ -148,7 +148,7 @@ fn snapped(scene: &Scene, axis: usize, bounds: &Aabb, ranks: &[usize]) -> Vec<f6
     let borders: Vec<f64> = borders.iter().map(plane).collect();
     // Heaviest wall so far, and the plane without one.
     let mut planes: Vec<(f64, f64)> = ranks.iter().map(|rank| (0.0, plane(rank))).collect();
-    for (at, area) in walls(scene, axis, bounds) {
+    for (at, area) in walls_across(scene, axis, bounds, |_| true) {
         if let Some(plane) = planes.get_mut(borders.partition_point(|b| *b <= at))
             && area > plane.0
         {
@@ -156,19 +156,4 @@ fn snapped(scene: &Scene, axis: usize, bounds: &Aabb, ranks: &[usize]) -> Vec<f6
         }
     }
     planes.into_iter().map(|(_, at)| at).collect()
-}
-
-/// Coordinates inside the bounds in which triangles lie across the axis, all three
-/// corners to the bit, with twice the area there; ascending.
-fn walls(scene: &Scene, axis: usize, bounds: &Aabb) -> Vec<(f64, f64)> {
-    let (lo, hi) = (bounds.lo[axis], bounds.hi[axis]);
-    let in_plane = |t: u32| {
-        let [a, b, c] = scene.corners(t).map(|p| p[axis]);
-        (a == b && b == c && lo < a && a < hi).then(|| (a, scene.normal(t).length()))
-    };
-    let mut found: Vec<(f64, f64)> =
-        (0..scene.len() as u32).into_par_iter().with_min_len(4096).filter_map(in_plane).collect();
-    // Stable: areas are added in the order of the scene.
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    found.chunk_by(|a, b| a.0 == b.0).map(|wall| (wall[0].0, wall.iter().map(|w| w.1).sum())).collect()
 }

@@ -20,6 +20,7 @@
 //! Conservative: as [`super::octree`] under policy R.
 
 use super::Structure;
+use super::builder::axes::walls_across;
 use super::builder::{cut, openings};
 use super::octree::{Octree, Policy};
 use crate::error::Result;
@@ -120,22 +121,10 @@ const WALL_SHARE: f64 = 0.01;
 /// The planes where most wall is, then halves of the widest gaps.
 fn walls(scene: &Scene, root: &Aabb, axis: usize, depth: u32) -> Vec<f64> {
     let wanted = (1 << depth) - 1;
-    let mut areas: Vec<(f64, f64)> = Vec::new();
-    for t in (0..scene.len() as u32).filter(|t| scene.occluder[*t as usize]) {
-        let corners = scene.corners(t);
-        let at = corners[0][axis];
-        if corners.iter().all(|c| c[axis] == at) && at > root.lo[axis] && at < root.hi[axis] {
-            areas.push((at + 0.0, scene.normal(t).length() * 0.5));
-        }
-    }
-    areas.sort_by(|a, b| a.0.total_cmp(&b.0));
     let size = root.size();
     let least = WALL_SHARE * size[(axis + 1) % 3] * size[(axis + 2) % 3];
-    let mut peaks: Vec<(f64, f64)> = areas
-        .chunk_by(|a, b| a.0 == b.0)
-        .map(|same| (same[0].0, same.iter().map(|s| s.1).sum()))
-        .filter(|(_, area)| *area >= least)
-        .collect();
+    let mut peaks = walls_across(scene, axis, root, |t| scene.occluder[t as usize]);
+    peaks.retain(|(_, area)| *area >= least);
     let mut planes = vec![root.lo[axis], root.hi[axis]];
     while planes.len() < wanted + 2 && !peaks.is_empty() {
         // Where they do not all find room, area alone would crowd them into one end.

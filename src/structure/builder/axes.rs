@@ -4,6 +4,8 @@
 
 use super::morton::interleave;
 use crate::math::{Aabb, DVec3};
+use crate::scene::Scene;
+use rayon::prelude::*;
 
 /// Cells an axis at most: three axes of nine bits.
 pub const CELLS_MAX: u32 = 512;
@@ -169,6 +171,22 @@ pub fn resolution(size: DVec3, cells: f64) -> [u32; 3] {
             }
         }
     }
+}
+
+/// Coordinates strictly inside the bounds in which triangles lie across the axis, all three
+/// corners to the bit, with their area there (m2); ascending. `counts` chooses triangles.
+pub fn walls_across(scene: &Scene, axis: usize, bounds: &Aabb, counts: impl Fn(u32) -> bool + Sync) -> Vec<(f64, f64)> {
+    let (lo, hi) = (bounds.lo[axis], bounds.hi[axis]);
+    let in_plane = |t: u32| {
+        let [a, b, c] = scene.corners(t).map(|p| p[axis]);
+        // Adding 0 makes one of the two zeros.
+        (a == b && b == c && lo < a && a < hi && counts(t)).then(|| (a + 0.0, 0.5 * scene.normal(t).length()))
+    };
+    let mut found: Vec<(f64, f64)> =
+        (0..scene.len() as u32).into_par_iter().with_min_len(4096).filter_map(in_plane).collect();
+    // Stable: areas are added in the order of the scene.
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.chunk_by(|a, b| a.0 == b.0).map(|wall| (wall[0].0, wall.iter().map(|w| w.1).sum())).collect()
 }
 
 #[cfg(test)]
