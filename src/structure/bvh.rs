@@ -19,7 +19,6 @@
 //! Conservative: a node's box is the union of its triangles' boxes, f32 offsets rounded
 //! outward. The tree does not depend on threads or kernels.
 
-mod arena;
 #[cfg(target_arch = "x86_64")]
 mod best_x86;
 mod bins;
@@ -30,10 +29,17 @@ mod grow;
 mod kernel;
 mod lay;
 mod linear;
+mod pages;
 mod record;
 #[cfg(target_arch = "x86_64")]
 mod record_x86;
+mod sides;
+#[cfg(target_arch = "x86_64")]
+mod sides_x86;
+mod small;
 mod sweep;
+#[cfg(target_arch = "x86_64")]
+mod sweep_x86;
 #[cfg(test)]
 mod tests;
 mod tree;
@@ -127,7 +133,7 @@ const SWEEP: usize = 8;
 impl Structure for Bvh {
     fn build(&self, scene: &Scene) -> Result<Hierarchy> {
         let records = record::records(scene, self.kernel);
-        let (tree, entries) = match self.split {
+        let (tree, sealed) = match self.split {
             Split::Morton => linear::build(scene, &records, self.leaf_size as usize),
             split => {
                 let grow = Grow {
@@ -141,6 +147,6 @@ impl Structure for Bvh {
                 grow.run(records)
             }
         };
-        Ok(lay::lay(scene, &tree, entries, if self.wide { LANES } else { 2 }, self.leaf_size))
+        Ok(lay::lay(scene, &tree, &sealed, if self.wide { LANES } else { 2 }, self.leaf_size))
     }
 }

@@ -19,21 +19,28 @@ pub fn best(all: &Bins, bins: usize) -> Option<Split> {
 /// Edge lengths of a box.
 #[target_feature(enable = "avx2")]
 #[inline]
-fn edges(span: __m256) -> __m128 {
+pub fn edges(span: __m256) -> __m128 {
     _mm_add_ps(_mm256_extractf128_ps::<1>(span), _mm256_castps256_ps128(span))
 }
 
-/// Half areas of eight boxes by their edge lengths.
+/// Lanes 0 to 2 of eight rows.
 #[target_feature(enable = "avx2")]
 #[inline]
-fn half_areas(e: &[[f32; 4]; 8]) -> __m256 {
+pub fn transposed(e: &[[f32; 4]; 8]) -> [__m256; 3] {
     let pair = |i: usize| _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(load(&e[i])), load(&e[i + 4]));
     let (a, b, c, d) = (pair(0), pair(1), pair(2), pair(3));
     let (xy0, xy1) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
     let (z0, z1) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
     let x = _mm256_shuffle_ps::<0b01_00_01_00>(xy0, xy1);
     let y = _mm256_shuffle_ps::<0b11_10_11_10>(xy0, xy1);
-    let z = _mm256_shuffle_ps::<0b01_00_01_00>(z0, z1);
+    [x, y, _mm256_shuffle_ps::<0b01_00_01_00>(z0, z1)]
+}
+
+/// Half areas of eight boxes by their edge lengths.
+#[target_feature(enable = "avx2")]
+#[inline]
+pub fn half_areas(e: &[[f32; 4]; 8]) -> __m256 {
+    let [x, y, z] = transposed(e);
     let xy_yz = _mm256_add_ps(_mm256_mul_ps(x, y), _mm256_mul_ps(y, z));
     _mm256_add_ps(xy_yz, _mm256_mul_ps(z, x))
 }
@@ -45,10 +52,11 @@ fn best_256(all: &Bins, bins: usize) -> Option<Split> {
     let mut costs = [f32::INFINITY; 3 * BINS_MAX];
     let mut least = infinite;
     let (mut left, mut right) = ([[0f32; 4]; BINS_MAX], [[0f32; 4]; BINS_MAX]);
-    let mut before = [0u32; BINS_MAX];
+    let mut before = [0u32; 3 * BINS_MAX];
     for axis in 0..3 {
         let spans: &[Span] = &all.spans[axis * stride..][..bins];
         let counts: &[u32] = &all.counts[axis * stride..][..bins];
+        let before = &mut before[axis * stride..][..stride];
         let mut span = load_record(&Record::EMPTY);
         for (out, s) in right.iter_mut().zip(spans).skip(1).rev() {
             span = _mm256_max_ps(span, load_record(s));
@@ -99,7 +107,7 @@ fn best_256(all: &Bins, bins: usize) -> Option<Split> {
         let equal = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_EQ_OQ>(costs, wanted));
         if equal != 0 {
             let i = group + equal.trailing_zeros() as usize;
-            return Some(Split { axis: i / stride, plane: i % stride, cost });
+            return Some(Split { axis: i / stride, plane: i % stride, left: before[i], cost });
         }
     }
     unreachable!("one of the costs is the least")

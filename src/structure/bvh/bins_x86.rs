@@ -75,7 +75,7 @@ pub fn load_record(r: &Record) -> __m256 {
 
 #[target_feature(enable = "avx2")]
 #[inline]
-fn store_record(r: &mut Record, v: __m256) {
+pub fn store_record(r: &mut Record, v: __m256) {
     // SAFETY: a record is 8 f32, 32-byte aligned.
     unsafe { _mm256_store_ps(r.0.as_mut_ptr(), v) }
 }
@@ -83,14 +83,14 @@ fn store_record(r: &mut Record, v: __m256) {
 /// The box alone. As numbers, the two words are subnormal, and arithmetic with those is slow.
 #[target_feature(enable = "avx2")]
 #[inline]
-fn bare(r: __m256) -> __m256 {
+pub fn bare(r: __m256) -> __m256 {
     _mm256_blend_ps::<0b1000_1000>(r, _mm256_setzero_ps())
 }
 
 /// Doubled centroid in lanes 0 to 2.
 #[target_feature(enable = "avx2")]
 #[inline]
-fn centre2(r: __m256) -> __m128 {
+pub fn centre2(r: __m256) -> __m128 {
     _mm_sub_ps(_mm256_extractf128_ps::<1>(r), _mm256_castps256_ps128(r))
 }
 

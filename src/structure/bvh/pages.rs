@@ -72,6 +72,33 @@ mod linux {
     }
 }
 
+/// Room for `capacity` elements that a build will fill from end to end.
+pub fn with_capacity<T>(capacity: usize) -> Vec<T> {
+    ask(Vec::with_capacity(capacity))
+}
+
+pub fn zeros(len: usize) -> Vec<u64> {
+    ask(vec![0; len])
+}
+
+/// The array, its memory on huge pages as far as that is not in use.
+fn ask<T>(array: Vec<T>) -> Vec<T> {
+    #[cfg(target_os = "linux")]
+    {
+        let start = array.as_ptr() as usize;
+        let from = start.next_multiple_of(HUGE_BYTES);
+        let end = (start + array.capacity() * size_of::<T>()) / HUGE_BYTES * HUGE_BYTES;
+        if from < end {
+            // SAFETY: memory that the array owns; advice may be refused and changes no content.
+            unsafe { libc::madvise(std::ptr::without_provenance_mut(from), end - from, libc::MADV_HUGEPAGE) };
+        }
+    }
+    array
+}
+
+#[cfg(target_os = "linux")]
+const HUGE_BYTES: usize = 1 << 21;
+
 #[cfg(not(target_os = "linux"))]
 impl Arena {
     pub fn zeroed(len: usize) -> Arena {
