@@ -2,7 +2,7 @@
 //! eight planes are judged at once. Operations and bits are those of `Bins::best`.
 
 use super::bins::{BINS_MAX, Bins, Split, stride};
-use super::bins_x86::{has_avx2, load, load_record};
+use super::bins_x86::{bare, has_avx2, load, load_record};
 use super::record::{Record, Span};
 use std::arch::x86_64::*;
 
@@ -59,14 +59,14 @@ fn best_256(all: &Bins, bins: usize) -> Option<Split> {
         let before = &mut before[axis * stride..][..stride];
         let mut span = load_record(&Record::EMPTY);
         for (out, s) in right.iter_mut().zip(spans).skip(1).rev() {
-            span = _mm256_max_ps(span, load_record(s));
+            span = _mm256_max_ps(span, bare(load_record(s)));
             // SAFETY: four f32.
             unsafe { _mm_storeu_ps(out.as_mut_ptr(), edges(span)) };
         }
         let mut span = load_record(&Record::EMPTY);
         let mut count = 0;
         for (i, (s, n)) in spans[..bins - 1].iter().zip(counts).enumerate() {
-            span = _mm256_max_ps(span, load_record(s));
+            span = _mm256_max_ps(span, bare(load_record(s)));
             count += n;
             before[i + 1] = count;
             // SAFETY: four f32.

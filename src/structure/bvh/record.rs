@@ -25,7 +25,10 @@ const TRIANGLE: usize = 3;
 const MATERIAL: usize = 7;
 
 impl Record {
-    pub const EMPTY: Span = Record([f32::NEG_INFINITY; 8]);
+    pub const EMPTY: Span = {
+        const NONE: f32 = f32::NEG_INFINITY;
+        Record([NONE, NONE, NONE, 0.0, NONE, NONE, NONE, 0.0])
+    };
 
     pub fn new(bounds: Box32, triangle: u32, material: u32) -> Record {
         let (lo, hi) = (bounds.lo, bounds.hi);

@@ -1,7 +1,7 @@
 //! AVX2 kernels of `sides`: three axes at once. Operations and bits are those of the twins.
 
 use super::bins::{BINS_MAX, Bins, Domain, Split, stride};
-use super::bins_x86::{has_avx2, load, load_record, store_record};
+use super::bins_x86::{bare, has_avx2, load, load_record, store_record};
 use super::record::{Record, Span};
 use std::arch::x86_64::*;
 
@@ -47,7 +47,7 @@ fn union(spans: &[Span]) -> Span {
         all = _mm256_max_ps(all, load_record(s));
     }
     let mut out = Record::EMPTY;
-    store_record(&mut out, all);
+    store_record(&mut out, bare(all));
     out
 }
 

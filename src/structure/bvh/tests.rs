@@ -78,7 +78,8 @@ fn bits(r: &[Record]) -> Vec<[u32; 8]> {
 }
 
 fn used(b: &Bins, bins: usize) -> (Vec<[u32; 8]>, Vec<u32>) {
-    (bits(&b.spans[..3 * stride(bins)]), b.counts[..3 * stride(bins)].to_vec())
+    let boxes: Vec<Record> = b.spans[..3 * stride(bins)].iter().map(|s| s.bare()).collect();
+    (bits(&boxes), b.counts[..3 * stride(bins)].to_vec())
 }
 
 #[test]
@@ -120,13 +121,13 @@ fn kernels_give_the_bits_of_their_twins() {
             let best = twin.best(bins);
             let below = [Domain::over(lo, hi, bins), domain];
             for kernel in Kernel::all() {
-                let (mut own, mut spare) = (Bins::ZERO, [Bins::ZERO; 2]);
+                let mut own = Bins::ZERO;
                 assert_eq!(
                     format!("{:?}", kernel.extent(input)),
                     format!("{:?}", bins::extent(input)),
                     "{kernel:?}: signs of zeros, too"
                 );
-                kernel.fill(input, &domain, bins, &mut own, &mut spare[0]);
+                kernel.fill(input, &domain, bins, &mut own);
                 assert_eq!(used(&own, bins), used(&twin, bins), "{kernel:?}, {bins} bins");
                 assert_eq!(kernel.best(&own, bins), best, "{kernel:?}, {bins} bins");
                 if let Some(split) = best {
@@ -146,8 +147,7 @@ fn kernels_give_the_bits_of_their_twins() {
                         let mut out = vec![Record::EMPTY; input.len()];
                         let mut pair = [Bins::ZERO; 2];
                         let (a, b) = out.split_at_mut(left);
-                        let sets = &mut [Bins::ZERO; 2];
-                        kernel.deal(input, [a, b], &domain, &split, &below, bins, pair.each_mut(), sets);
+                        kernel.deal(input, [a, b], &domain, &split, &below, bins, pair.each_mut());
                         (bits(&out), used(&pair[0], bins), used(&pair[1], bins))
                     };
                     let dealt = deal(kernel);
