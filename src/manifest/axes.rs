@@ -46,7 +46,7 @@ pub static AXES: &[Axis] = &[
         settled: None,
         complete: None,
         parts: || parts(structure::ALL),
-        check: |spec| find("structure", structure::ALL, spec).map(|(_, s)| s),
+        check: |spec| structure::find_structure(spec).map(|(_, s)| s),
     },
     Axis {
         name: "culling",

@@ -45,9 +45,9 @@ mod tests;
 mod tree;
 
 use super::Structure;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::hierarchy::{Hierarchy, LANES};
-use crate::registry::{Default, Entry, Param};
+use crate::registry::{Default, Entry, Param, Spec};
 use crate::scene::Scene;
 pub use cost::sah_cost;
 use grow::Grow;
@@ -59,8 +59,8 @@ pub const ENTRY: Entry<dyn Structure> = Entry {
     revision: 1,
     params: &[
         Param {
-            name: "split",
-            default: Default::Choice(&["sah", "median", "morton"]),
+            name: SPLIT,
+            default: Default::Choice(&[SAH, "median", "morton"]),
             about: "planes: sah by binned surface areas; median of the centroids; morton by the highest bit of their codes",
         },
         Param {
@@ -69,12 +69,12 @@ pub const ENTRY: Entry<dyn Structure> = Entry {
             about: "a node with more triangles is divided",
         },
         Param {
-            name: "stop",
+            name: STOP,
             default: Default::Choice(&["size", "cost"]),
             about: "sah: smaller nodes are leaves at once (size), or where dividing them costs more than their triangles",
         },
         Param {
-            name: "bins",
+            name: BINS,
             default: Default::Int { value: 16, min: 2, max: bins::BINS_MAX as i64 },
             about: "sah: bins of centroids an axis",
         },
@@ -86,19 +86,45 @@ pub const ENTRY: Entry<dyn Structure> = Entry {
     ],
     make: |spec| {
         Box::new(Bvh {
-            split: match spec.text("split") {
+            split: match spec.text(SPLIT) {
                 "median" => Split::Median,
                 "morton" => Split::Morton,
                 _ => Split::Sah,
             },
             leaf_size: spec.int("leaf_size") as u32,
-            by_cost: spec.text("stop") == "cost",
-            bins: spec.int("bins") as u32,
+            by_cost: spec.text(STOP) == "cost",
+            bins: spec.int(BINS) as u32,
             wide: spec.text("layout") == "wide",
             kernel: Kernel::fastest(),
         })
     },
 };
+
+const SPLIT: &str = "split";
+const SAH: &str = "sah";
+const STOP: &str = "stop";
+const BINS: &str = "bins";
+
+/// What the parameters of a resolved spec say together: other splits than by areas know
+/// neither bins nor costs, and what has no effect must not be stated. Defaults say nothing:
+/// every resolved spec has them.
+pub fn check(spec: &Spec) -> Result<()> {
+    if spec.kind != ENTRY.name || spec.text(SPLIT) == SAH {
+        return Ok(());
+    }
+    let split = spec.text(SPLIT);
+    for (name, why) in [(BINS, "has no bins"), (STOP, "knows no costs to stop by")] {
+        let default = ENTRY.params.iter().find(|p| p.name == name).map(|p| p.default.value());
+        let stated = &spec.params[name];
+        if Some(stated) != default.as_ref() {
+            let e = Error::new(format!("`{name}` is {stated}, but `{SPLIT}={split}` {why}")).key(name);
+            return Err(e.help(format!(
+                "leave `{name}` out, or take `{SPLIT}={SAH}`; where `{SPLIT}` is a list, give `{split}` an entry of its own"
+            )));
+        }
+    }
+    Ok(())
+}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Split {

@@ -40,8 +40,15 @@ pub static ALL: &[Entry<dyn Structure>] = &[
     uniform_grid::ENTRY,
 ];
 
+/// Finds and checks a structure, also what its parameters say together.
+pub fn find_structure(spec: &Spec) -> Result<(&'static Entry<dyn Structure>, Spec)> {
+    let (entry, resolved) = find("structure", ALL, spec)?;
+    bvh::check(&resolved)?;
+    Ok((entry, resolved))
+}
+
 /// The structure that `spec` names, with the spec's defaults filled in.
 pub fn make(spec: &Spec) -> Result<(Box<dyn Structure>, Spec)> {
-    let (entry, resolved) = find("structure", ALL, spec)?;
+    let (entry, resolved) = find_structure(spec)?;
     Ok((entry.build(&resolved), resolved))
 }

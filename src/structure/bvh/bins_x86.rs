@@ -1,7 +1,7 @@
 //! AVX2 kernels of `bins`: a record is one register, a box grows by one `max`, and the
 //! side of a record selects addresses instead of branches, which would be guessed wrong
-//! half of the time. A bin is counted in a word of its box, so that a record costs one
-//! store a bin, not two. The operations are those of the twins, and so are the bits.
+//! half of the time. A bin is counted in a word of its box: a record costs one store a
+//! bin, not two. The operations are those of the twins, and so are the bits.
 
 use super::bins::{BINS_MAX, Bins, Domain, Split, stride};
 use super::record::{Record, Span};
@@ -11,17 +11,17 @@ pub fn has_avx2() -> bool {
     is_x86_feature_detected!("avx2")
 }
 
-/// See `bins::fill`.
+/// See `bins::fill`; `spare` is overwritten.
 ///
 /// # Panics
 /// If the processor lacks AVX2.
-pub fn fill(records: &[Record], domain: &Domain, bins: usize, out: &mut Bins) {
+pub fn fill(records: &[Record], domain: &Domain, bins: usize, out: &mut Bins, spare: &mut Bins) {
     assert!(has_avx2() && bins <= BINS_MAX);
     // SAFETY: the processor has the feature, as just asserted.
-    unsafe { fill_256(records, domain, bins, out) }
+    unsafe { fill_256(records, domain, bins, out, spare) }
 }
 
-/// See `bins::deal`.
+/// See `bins::deal`; `spare` is overwritten.
 ///
 /// # Panics
 /// If the processor lacks AVX2, or if the sides are not as large as the split makes them.
@@ -33,10 +33,11 @@ pub fn deal(
     below: &[Domain; 2],
     bins: usize,
     out: [&mut Bins; 2],
+    spare: &mut [Bins; 2],
 ) {
     assert!(has_avx2() && bins <= BINS_MAX && split.axis < 3);
     // SAFETY: the processor has the feature, as just asserted.
-    unsafe { deal_256(records, sides, domain, split, below, bins, out) }
+    unsafe { deal_256(records, sides, domain, split, below, bins, out, spare) }
 }
 
 /// See `bins::part`.
@@ -127,7 +128,7 @@ fn place(centre2: __m128, g: &Grid) -> __m128 {
     _mm_mul_ps(_mm_sub_ps(centre2, g.lo), g.scale)
 }
 
-/// Adds the record to the bin of each axis; [`count`] comes after the last.
+/// Adds the record to the bin of each axis; [`count`] or [`merge`] come after the last.
 #[target_feature(enable = "avx2")]
 #[inline]
 fn add(into: &mut Bins, r: __m256, place: __m128, rows: &Rows) {
@@ -151,23 +152,44 @@ fn add(into: &mut Bins, r: __m256, place: __m128, rows: &Rows) {
 }
 
 #[target_feature(enable = "avx2")]
-fn fill_256(records: &[Record], domain: &Domain, bins: usize, out: &mut Bins) {
+fn fill_256(records: &[Record], domain: &Domain, bins: usize, out: &mut Bins, spare: &mut Bins) {
     let (grid, rows) = (grid(domain), rows(bins));
     out.clear(bins);
-    for r in records {
+    spare.clear(bins);
+    // Two sets in turn: neighbours fall into one bin, and each would wait for the last.
+    let (pairs, rest) = records.as_chunks::<2>();
+    for [a, b] in pairs {
+        let (a, b) = (bare(load_record(a)), bare(load_record(b)));
+        add(out, a, place(centre2(a), &grid), &rows);
+        add(spare, b, place(centre2(b), &grid), &rows);
+    }
+    for r in rest {
         let r = bare(load_record(r));
         add(out, r, place(centre2(r), &grid), &rows);
     }
-    count(out, bins);
+    merge(out, spare, bins);
 }
 
-/// Takes the counts out of the words of the boxes, which then mean nothing.
+/// Word of a box in which its bin is counted.
+const COUNT: usize = 3;
+
+/// Takes the counts out of the boxes, whose words then mean nothing.
 #[target_feature(enable = "avx2")]
 #[inline]
 fn count(out: &mut Bins, bins: usize) {
     let used = 3 * stride(bins);
     for (count, span) in out.counts[..used].iter_mut().zip(&out.spans[..used]) {
-        *count = span.0[3].to_bits();
+        *count = span.0[COUNT].to_bits();
+    }
+}
+
+/// [`count`] of two sets in one.
+#[target_feature(enable = "avx2")]
+fn merge(out: &mut Bins, other: &Bins, bins: usize) {
+    for i in 0..3 * stride(bins) {
+        out.counts[i] = out.spans[i].0[COUNT].to_bits() + other.spans[i].0[COUNT].to_bits();
+        let grown = _mm256_max_ps(load_record(&out.spans[i]), load_record(&other.spans[i]));
+        store_record(&mut out.spans[i], grown);
     }
 }
 
@@ -196,37 +218,31 @@ fn goes_right(centre2: __m128, plane: &Plane) -> __m128 {
     _mm_cmpge_ps(place(_mm_permutevar_ps(centre2, plane.lane), &plane.grid), plane.at)
 }
 
+/// Fewer records are binned into one set: clearing and merging another costs more.
+const FEW: usize = 128;
+
 /// Two slices that are filled from their beginnings.
 struct Sides {
     start: [*mut Record; 2],
     size: [usize; 2],
-    left: usize,
-    done: usize,
+    at: [usize; 2],
 }
 
 impl Sides {
     fn of(sides: [&mut [Record]; 2]) -> Sides {
         let [left, right] = sides;
         let size = [left.len(), right.len()];
-        Sides { start: [left.as_mut_ptr(), right.as_mut_ptr()], size, left: 0, done: 0 }
+        Sides { start: [left.as_mut_ptr(), right.as_mut_ptr()], size, at: [0; 2] }
     }
 
-    /// `side` is 0 or 1.
     #[target_feature(enable = "avx2")]
     #[inline]
     fn push(&mut self, side: usize, r: __m256) {
-        // Chosen without a branch, and without memory that the next record waits for.
-        let right = self.done - self.left;
-        let at = self.left ^ ((self.left ^ right) & side.wrapping_neg());
+        let at = self.at[side];
         assert!(at < self.size[side], "the sides are as large as counted");
         // SAFETY: inside the slice that was borrowed for as long as this lives, and aligned.
         unsafe { _mm256_store_ps(self.start[side].add(at).cast(), r) };
-        self.left += 1 - side;
-        self.done += 1;
-    }
-
-    fn assert_full(&self) {
-        assert_eq!([self.left, self.done - self.left], self.size, "the sides are as large as counted");
+        self.at[side] = at + 1;
     }
 }
 
@@ -238,12 +254,19 @@ fn deal_256(
     split: &Split,
     below: &[Domain; 2],
     bins: usize,
-    mut out: [&mut Bins; 2],
+    out: [&mut Bins; 2],
+    spare: &mut [Bins; 2],
 ) {
     let (rows, plane) = (rows(bins), plane(domain, split));
     let [left, right] = [grid(&below[0]), grid(&below[1])];
-    out.iter_mut().for_each(|s| s.clear(bins));
+    let [a, b] = out;
+    let [c, d] = spare;
+    // By turn and side: neighbours fall into one bin, and each would wait for the last.
+    let mut sets = [[a, b], [c, d]];
+    let turns = if records.len() >= FEW { 2 } else { 1 };
+    sets[..turns].iter_mut().flatten().for_each(|s| s.clear(bins));
     let mut to = Sides::of(sides);
+    let mut turn = 0;
     for r in records {
         let whole = load_record(r);
         let r = bare(whole);
@@ -255,10 +278,18 @@ fn deal_256(
             lo: _mm_blendv_ps(left.lo, right.lo, right_mask),
             scale: _mm_blendv_ps(left.scale, right.scale, right_mask),
         };
-        add(out[side], r, place(c, &grid), &rows);
+        add(sets[turn][side], r, place(c, &grid), &rows);
+        turn ^= turns - 1;
     }
-    to.assert_full();
-    out.into_iter().for_each(|s| count(s, bins));
+    assert_eq!(to.at, to.size, "the sides are as large as counted");
+    let [[a, b], [c, d]] = sets;
+    if turns == 2 {
+        merge(a, c, bins);
+        merge(b, d, bins);
+    } else {
+        count(a, bins);
+        count(b, bins);
+    }
 }
 
 #[target_feature(enable = "avx2")]
@@ -269,7 +300,7 @@ fn part_256(records: &[Record], sides: [&mut [Record]; 2], domain: &Domain, spli
         let r = load_record(r);
         to.push((_mm_movemask_ps(goes_right(centre2(bare(r)), &plane)) & 1) as usize, r);
     }
-    to.assert_full();
+    assert_eq!(to.at, to.size, "the sides are as large as counted");
 }
 
 #[target_feature(enable = "avx2")]

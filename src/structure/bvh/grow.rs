@@ -59,6 +59,7 @@ struct Job<'a> {
 
 /// Working memory of a task.
 struct Scratch {
+    kernel_sets: [Bins; 2],
     own: Bins,
     sweep: Sweep,
     /// Bins of children, a pair for each level that a task is within.
@@ -67,7 +68,7 @@ struct Scratch {
 
 impl Scratch {
     fn new() -> Box<Scratch> {
-        Box::new(Scratch { own: Bins::ZERO, sweep: Sweep::default(), free: Vec::new() })
+        Box::new(Scratch { kernel_sets: [Bins::ZERO; 2], own: Bins::ZERO, sweep: Sweep::default(), free: Vec::new() })
     }
 
     fn pair(&mut self) -> Box<[Bins; 2]> {
@@ -174,7 +175,7 @@ impl Grow {
         let below = self.kernel.below(from, &job.domain, job.bins, &split, &bounds, bins_below);
         let unbinned = if self.by_cost { 1 } else { self.leaf_size }.max(self.sweep);
         let d = Divided { left, bounds, domains: below, bins: bins_below, binned: larger > unbinned, moved: true };
-        self.deal(job, &split, &d, pair);
+        self.deal(job, &split, &d, pair, scratch);
         Some(d)
     }
 
@@ -186,28 +187,31 @@ impl Grow {
     fn fill(&self, job: &Job, scratch: &mut Scratch) {
         let (records, domain, bins) = (&*job.here, &job.domain, job.bins);
         if records.len() < WIDE || rayon::current_num_threads() == 1 {
-            return self.kernel.fill(records, domain, bins, &mut scratch.own);
+            let [spare, _] = &mut scratch.kernel_sets;
+            return self.kernel.fill(records, domain, bins, &mut scratch.own, spare);
         }
-        let parts: Vec<Box<Bins>> = records
+        let parts: Vec<Box<[Bins; 2]>> = records
             .par_chunks(CHUNK)
             .map(|chunk| {
-                let mut own = Box::new(Bins::ZERO);
-                self.kernel.fill(chunk, domain, bins, &mut own);
-                own
+                let mut sets = Box::new([Bins::ZERO; 2]);
+                let [own, spare] = &mut *sets;
+                self.kernel.fill(chunk, domain, bins, own, spare);
+                sets
             })
             .collect();
         scratch.own.clear(bins);
-        parts.iter().for_each(|p| scratch.own.merge(p, bins));
+        parts.iter().for_each(|p| scratch.own.merge(&p[0], bins));
     }
 
-    fn deal(&self, job: &mut Job, split: &Split, to: &Divided, pair: &mut [Bins; 2]) {
+    fn deal(&self, job: &mut Job, split: &Split, to: &Divided, pair: &mut [Bins; 2], scratch: &mut Scratch) {
         let (records, domain, below, bins) = (&*job.here, &job.domain, &to.domains, to.bins);
         let (left, right) = job.there.split_at_mut(to.left);
         if !to.binned {
             return self.kernel.part(records, [left, right], domain, split);
         }
         if records.len() < WIDE || rayon::current_num_threads() == 1 {
-            return self.kernel.deal(records, [left, right], domain, split, below, bins, pair.each_mut());
+            let sets = &mut scratch.kernel_sets;
+            return self.kernel.deal(records, [left, right], domain, split, below, bins, pair.each_mut(), sets);
         }
         // Each task writes to its own part of each side: the order is that of one pass.
         let counts: Vec<usize> = records.par_chunks(CHUNK).map(|c| count_left(c, domain, split)).collect();
@@ -219,18 +223,19 @@ impl Grow {
             rest = (left, right);
             tasks.push((chunk, [a, b]));
         }
-        let parts: Vec<Box<[Bins; 2]>> = tasks
+        let parts: Vec<Box<[[Bins; 2]; 2]>> = tasks
             .into_par_iter()
             .map(|(chunk, sides)| {
-                let mut out = Box::new([Bins::ZERO; 2]);
-                self.kernel.deal(chunk, sides, domain, split, below, bins, out.each_mut());
-                out
+                let mut sets = Box::new([const { [Bins::ZERO; 2] }; 2]);
+                let [out, spare] = &mut *sets;
+                self.kernel.deal(chunk, sides, domain, split, below, bins, out.each_mut(), spare);
+                sets
             })
             .collect();
         pair.iter_mut().for_each(|p| p.clear(bins));
         for part in parts {
-            pair[0].merge(&part[0], bins);
-            pair[1].merge(&part[1], bins);
+            pair[0].merge(&part[0][0], bins);
+            pair[1].merge(&part[0][1], bins);
         }
     }
 

@@ -29,12 +29,13 @@ impl Kernel {
         Kernel::all()[Kernel::all().len() - 1]
     }
 
-    pub fn fill(self, records: &[Record], domain: &Domain, bins: usize, out: &mut Bins) {
+    pub fn fill(self, records: &[Record], domain: &Domain, bins: usize, out: &mut Bins, spare: &mut Bins) {
         match self {
             Kernel::Scalar => bins::fill(records, domain, bins, out),
             #[cfg(target_arch = "x86_64")]
-            Kernel::Avx2 => bins_x86::fill(records, domain, bins, out),
+            Kernel::Avx2 => bins_x86::fill(records, domain, bins, out, spare),
         }
+        let _ = spare;
     }
 
     pub fn deal(
@@ -46,12 +47,14 @@ impl Kernel {
         below: &[Domain; 2],
         bins: usize,
         out: [&mut Bins; 2],
+        spare: &mut [Bins; 2],
     ) {
         match self {
             Kernel::Scalar => bins::deal(records, sides, domain, split, below, bins, out),
             #[cfg(target_arch = "x86_64")]
-            Kernel::Avx2 => bins_x86::deal(records, sides, domain, split, below, bins, out),
+            Kernel::Avx2 => bins_x86::deal(records, sides, domain, split, below, bins, out, spare),
         }
+        let _ = spare;
     }
 
     pub fn part(self, records: &[Record], sides: [&mut [Record]; 2], domain: &Domain, split: &Split) {

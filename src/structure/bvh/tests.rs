@@ -121,13 +121,13 @@ fn kernels_give_the_bits_of_their_twins() {
             let best = twin.best(bins);
             let below = [Domain::over(lo, hi, bins), domain];
             for kernel in Kernel::all() {
-                let mut own = Bins::ZERO;
+                let (mut own, mut spare) = (Bins::ZERO, [Bins::ZERO; 2]);
                 assert_eq!(
                     format!("{:?}", kernel.extent(input)),
                     format!("{:?}", bins::extent(input)),
                     "{kernel:?}: signs of zeros, too"
                 );
-                kernel.fill(input, &domain, bins, &mut own);
+                kernel.fill(input, &domain, bins, &mut own, &mut spare[0]);
                 assert_eq!(used(&own, bins), used(&twin, bins), "{kernel:?}, {bins} bins");
                 assert_eq!(kernel.best(&own, bins), best, "{kernel:?}, {bins} bins");
                 if let Some(split) = best {
@@ -147,7 +147,8 @@ fn kernels_give_the_bits_of_their_twins() {
                         let mut out = vec![Record::EMPTY; input.len()];
                         let mut pair = [Bins::ZERO; 2];
                         let (a, b) = out.split_at_mut(left);
-                        kernel.deal(input, [a, b], &domain, &split, &below, bins, pair.each_mut());
+                        let sets = &mut [Bins::ZERO; 2];
+                        kernel.deal(input, [a, b], &domain, &split, &below, bins, pair.each_mut(), sets);
                         (bits(&out), used(&pair[0], bins), used(&pair[1], bins))
                     };
                     let dealt = deal(kernel);
