@@ -45,6 +45,26 @@ pub fn half_areas(e: &[[f32; 4]; 8]) -> __m256 {
     _mm256_add_ps(xy_yz, _mm256_mul_ps(z, x))
 }
 
+/// Sums of all counts before each bin, and of all, in every lane; bins past the last are empty.
+#[target_feature(enable = "avx2")]
+#[inline]
+fn sums(counts: &[u32], before: &mut [u32]) -> __m256i {
+    let mut total = _mm256_setzero_si256();
+    for (out, counts) in before.as_chunks_mut::<8>().0.iter_mut().zip(counts.as_chunks::<8>().0) {
+        // SAFETY: eight counts.
+        let counts = unsafe { _mm256_loadu_si256(counts.as_ptr().cast()) };
+        let pairs = _mm256_add_epi32(counts, _mm256_slli_si256::<4>(counts));
+        let halves = _mm256_add_epi32(pairs, _mm256_slli_si256::<8>(pairs));
+        // The sum of the lower half goes to all of the upper one.
+        let low = _mm256_shuffle_epi32::<0xff>(_mm256_permute2x128_si256::<0x08>(halves, halves));
+        let sums = _mm256_add_epi32(_mm256_add_epi32(halves, low), total);
+        // SAFETY: eight counts.
+        unsafe { _mm256_storeu_si256(out.as_mut_ptr().cast(), _mm256_sub_epi32(sums, counts)) };
+        total = _mm256_permutevar8x32_epi32(sums, _mm256_set1_epi32(7));
+    }
+    total
+}
+
 #[target_feature(enable = "avx2")]
 fn best_256(all: &Bins, bins: usize) -> Option<Split> {
     let infinite = _mm256_set1_ps(f32::INFINITY);
@@ -55,8 +75,6 @@ fn best_256(all: &Bins, bins: usize) -> Option<Split> {
     let mut before = [0u32; 3 * BINS_MAX];
     for axis in 0..3 {
         let spans: &[Span] = &all.spans[axis * stride..][..bins];
-        let counts: &[u32] = &all.counts[axis * stride..][..bins];
-        let before = &mut before[axis * stride..][..stride];
         let mut span = load_record(&Record::EMPTY);
         for (out, s) in right.iter_mut().zip(spans).skip(1).rev() {
             span = _mm256_max_ps(span, bare(load_record(s)));
@@ -64,18 +82,14 @@ fn best_256(all: &Bins, bins: usize) -> Option<Split> {
             unsafe { _mm_storeu_ps(out.as_mut_ptr(), edges(span)) };
         }
         let mut span = load_record(&Record::EMPTY);
-        let mut count = 0;
-        for (i, (s, n)) in spans[..bins - 1].iter().zip(counts).enumerate() {
+        for (i, s) in spans[..bins - 1].iter().enumerate() {
             span = _mm256_max_ps(span, bare(load_record(s)));
-            count += n;
-            before[i + 1] = count;
             // SAFETY: four f32.
             unsafe { _mm_storeu_ps(left[i + 1].as_mut_ptr(), edges(span)) };
         }
-        let total = count + counts[bins - 1];
-        // Past the last plane nothing is right.
-        before[bins..stride].fill(total);
-        let total = _mm256_set1_epi32(total as i32);
+        let counts = &all.counts[axis * stride..][..stride];
+        let before = &mut before[axis * stride..][..stride];
+        let total = sums(counts, before);
         for group in (0..stride).step_by(8) {
             // SAFETY: eight counts of an array whose length is a multiple of eight.
             let n_left = unsafe { _mm256_loadu_si256(before[group..group + 8].as_ptr().cast()) };
