@@ -3,7 +3,8 @@
 //! Records move between two arrays, dealt stably to the sides of a split, so that a
 //! node is a slice of one of them and its triangles keep the order of the scene. The
 //! box of a child is the union of its bins, known before the records move; so the pass
-//! that moves them also fills the bins of both children. One pass a level.
+//! that moves them also fills the bins of both children. One pass a level. Small nodes
+//! go on in [`small`].
 
 use super::bins::{Bins, Domain, Split, count_left};
 use super::kernel::Kernel;

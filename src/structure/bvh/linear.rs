@@ -5,6 +5,7 @@
 //! Ranges that are still too large where those bits end are sorted again by the other
 //! 31; where all 63 are equal, the range is halved.
 
+use super::pages;
 use super::record::{self, Record, Span};
 use super::tree::{Slim, Tree};
 use crate::hierarchy::NONE;
@@ -29,7 +30,7 @@ struct Linear<'a> {
 
 /// Builds over all triangles; `records` are those of the scene, in its order.
 pub fn build(scene: &Scene, records: &[Record], leaf_size: usize) -> (Vec<Slim>, Vec<u64>) {
-    let mut sealed = vec![0; records.len()];
+    let mut sealed = pages::zeros(records.len());
     if records.is_empty() {
         return (Vec::new(), sealed);
     }
@@ -53,7 +54,9 @@ impl Linear<'_> {
     /// Large nodes here, their subtrees in tasks. `lower` tells which bits are in the keys.
     fn plant(&self, keys: &mut [u64], sealed: &mut [u64], lower: bool) -> (Tree, Span) {
         if keys.len() <= TASK.max(self.leaf_size) || rayon::current_num_threads() == 1 {
-            let mut out = vec![Slim::UNBORN];
+            let leaf = self.leaf_size.div_ceil(2);
+            let mut out = pages::with_capacity(2 * keys.len().div_ceil(leaf));
+            out.push(Slim::UNBORN);
             let span = self.grow(keys, sealed, lower, &mut out, 0);
             return (Tree::Part(out), span);
         }

@@ -1,6 +1,11 @@
 //! Large working arrays on huge pages, where the system gives them when asked: a build
 //! writes each array once from end to end, and most of the cost of fresh memory is the
-//! fault for every 4 KiB of it.
+//! fault for every 4 KiB of it. City of a million triangles, one thread: 660 faults and
+//! 176 ms for 16,500 and 211 at 4 a leaf (1.20 times as fast), 105 ms for 141 at 64.
+//!
+//! Records have a mapping of their own, because the allocator clears what is aligned to
+//! 32 bytes itself, page by page; other arrays take the allocator's memory with the same
+//! advice.
 
 use super::record::Record;
 use std::ops::{Deref, DerefMut};
