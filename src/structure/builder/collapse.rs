@@ -125,4 +125,37 @@ mod tests {
         assert_eq!(wide[1..].iter().map(|n| n.first).collect::<Vec<_>>(), (7..15).collect::<Vec<_>>());
         assert!(wide[1..].iter().all(Node::is_leaf));
     }
+
+    #[test]
+    fn a_family_is_what_plain_lists_make_of_it() {
+        use rand_chacha::rand_core::{RngCore, SeedableRng};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        for nodes in (1..60).chain([400]) {
+            // Few sizes, so that many areas are equal.
+            let mut node = |first: u32| {
+                let hi = crate::math::Vec3::splat((rng.next_u32() % 4) as f32);
+                Node { bounds: Box32 { lo: crate::math::Vec3::ZERO, hi }, ..Node::new(first, first + 1, 0) }
+            };
+            let mut binary = vec![node(0)];
+            while binary.len() < nodes {
+                let (at, first) = (binary.len() * 7 / 11, binary.len() as u32);
+                let leaf = (at..binary.len()).find(|i| binary[*i].is_leaf()).expect("the last is a leaf");
+                let children = if first.is_multiple_of(5) { 1 } else { 2 };
+                (binary[leaf].first_child, binary[leaf].child_count) = (first, children);
+                (0..u32::from(children)).for_each(|c| binary.push(node(first + c)));
+            }
+            for (i, width) in (0..binary.len()).flat_map(|i| [(i, 2), (i, LANES)]) {
+                let mut plain: Vec<usize> = binary[i].children().collect();
+                while plain.len() < width {
+                    let area = |k: &usize| binary[plain[*k]].bounds.half_area();
+                    let inner = (0..plain.len()).filter(|k| !binary[plain[*k]].is_leaf());
+                    // The first of the largest: the last from behind.
+                    let Some(k) = inner.rev().max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
+                    plain.splice(k..=k, binary[plain[k]].children());
+                }
+                let family = Family::of(&binary[..], i, width);
+                assert!(family.members().iter().map(|m| *m as usize).eq(plain), "{nodes} nodes, of {i}");
+            }
+        }
+    }
 }

@@ -165,7 +165,7 @@ fn mistakes_in_the_matrix_name_place_and_remedy() {
             (
                 "[matrix]\nstructure = [\"list\"]\nculling = [{ kind = \"frustum\", primitive = \"sphere\", arithmetic = \"f64\" }]",
                 14,
-                64,
+                67,
                 "matrix.culling.arithmetic",
                 "`primitive=sphere`",
                 "leave `arithmetic` out",
