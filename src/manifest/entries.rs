@@ -236,11 +236,28 @@ pub fn expand_part(
         mistakes.note(&node.place, key, e.help("shorten its lists and ranges"));
         return Vec::new();
     }
-    let specs = product(&lists).into_iter().map(|params| {
+    // Each parameter is right alone: what is left are those that do not go together.
+    let mut told = HashSet::new();
+    let mut specs = Vec::new();
+    for params in product(&lists) {
         let spec = params.into_iter().fold(Spec::new(kind), |s, (k, v)| s.with(&k, v));
-        check(&spec).expect("every parameter was checked alone")
-    });
-    specs.collect()
+        match check(&spec) {
+            Ok(spec) => specs.push(spec),
+            Err(e) if told.insert(e.message.clone()) => note_together(mistakes, key, node, e),
+            Err(_) => {}
+        }
+    }
+    specs
+}
+
+/// A mistake of several parameters, at the value of the one that is to blame.
+fn note_together(mistakes: &Mistakes, key: &str, node: &Node, mut e: Error) {
+    let blamed = e.key.take();
+    let entry = node.table().into_iter().flatten().find(|(name, _)| Some(&name.name) == blamed.as_ref());
+    match entry {
+        Some((name, value)) => mistakes.note(&value.place, &format!("{key}.{}", name.name), e),
+        None => mistakes.note(&node.place, key, e),
+    }
 }
 
 /// Variants of one table: more is a slip of the pen.

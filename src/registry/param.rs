@@ -91,7 +91,10 @@ impl Param {
                     let list = is.iter().map(|c| format!("`{with}={c}`")).collect::<Vec<_>>().join(" or ");
                     return Err(Error::new(format!("is {value}, which has no effect with `{with}={stated}`"))
                         .key(self.name)
-                        .help(format!("leave `{}` out there, or take {list}", self.name)));
+                        .help(format!(
+                            "leave `{}` out there, or take {list}; where `{with}` is a list, give `{stated}` an entry of its own",
+                            self.name
+                        )));
                 }
             }
             default = of;
@@ -157,7 +160,12 @@ mod tests {
         assert_eq!(resolved("bvh:arithmetic=f32,bins=8").unwrap(), "bvh:arithmetic=f32,bins=8,split=sah");
         let e = resolved("bvh:split=median,bins=8").unwrap_err();
         assert!(e.to_string().contains("is 8, which has no effect with `split=median`"), "{e}");
-        assert_eq!(e.help.as_deref(), Some("leave `bins` out there, or take `split=sah`"));
+        assert_eq!(
+            e.help.as_deref(),
+            Some(
+                "leave `bins` out there, or take `split=sah`; where `split` is a list, give `median` an entry of its own"
+            )
+        );
         assert!(resolved("bvh:arithmetic=f64,bins=8").unwrap_err().to_string().contains("`arithmetic=f64`"));
         assert!(resolved("bvh:bins=33,split=median").unwrap_err().to_string().contains("from 2 to 32"));
     }

@@ -19,7 +19,6 @@
 //! Conservative: a node's box is the union of its triangles' boxes, f32 offsets rounded
 //! outward. The tree does not depend on threads or kernels.
 
-mod arena;
 #[cfg(target_arch = "x86_64")]
 mod best_x86;
 mod bins;
@@ -30,10 +29,17 @@ mod grow;
 mod kernel;
 mod lay;
 mod linear;
+mod pages;
 mod record;
 #[cfg(target_arch = "x86_64")]
 mod record_x86;
+mod sides;
+#[cfg(target_arch = "x86_64")]
+mod sides_x86;
+mod small;
 mod sweep;
+#[cfg(target_arch = "x86_64")]
+mod sweep_x86;
 #[cfg(test)]
 mod tests;
 mod tree;
@@ -64,13 +70,17 @@ pub const ENTRY: Entry<dyn Structure> = Entry {
         },
         Param {
             name: "stop",
-            default: Default::Choice(&["size", "cost"]),
-            about: "sah: smaller nodes are leaves at once (size), or where dividing them costs more than their triangles",
+            default: Default::Only { with: "split", is: &["sah"], of: &Default::Choice(&["size", "cost"]) },
+            about: "smaller nodes are leaves at once (size), or where dividing them costs more than their triangles",
         },
         Param {
             name: "bins",
-            default: Default::Int { value: 16, min: 2, max: bins::BINS_MAX as i64 },
-            about: "sah: bins of centroids an axis",
+            default: Default::Only {
+                with: "split",
+                is: &["sah"],
+                of: &Default::Int { value: 16, min: 2, max: bins::BINS_MAX as i64 },
+            },
+            about: "bins of centroids an axis; small nodes take fewer, and those of up to 8 triangles try every place",
         },
         Param {
             name: "layout",
@@ -127,7 +137,7 @@ const SWEEP: usize = 8;
 impl Structure for Bvh {
     fn build(&self, scene: &Scene) -> Result<Hierarchy> {
         let records = record::records(scene, self.kernel);
-        let (tree, entries) = match self.split {
+        let (tree, sealed) = match self.split {
             Split::Morton => linear::build(scene, &records, self.leaf_size as usize),
             split => {
                 let grow = Grow {
@@ -141,6 +151,6 @@ impl Structure for Bvh {
                 grow.run(records)
             }
         };
-        Ok(lay::lay(scene, &tree, entries, if self.wide { LANES } else { 2 }, self.leaf_size))
+        Ok(lay::lay(scene, &tree, &sealed, if self.wide { LANES } else { 2 }, self.leaf_size))
     }
 }

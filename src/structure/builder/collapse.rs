@@ -48,29 +48,33 @@ pub fn collapse(binary: &[Node]) -> Vec<Node> {
 /// Up to `width` descendants that together are one node, in the order of entries.
 pub struct Family {
     members: [u32; LANES],
-    /// Surface of each; below every other for a leaf, which has no children to adopt.
-    areas: [f32; LANES],
+    /// Surface of each, as a number in the total order of f32; below every other for a
+    /// leaf, which has no children to adopt.
+    areas: [i32; LANES],
     count: usize,
 }
 
 impl Family {
     /// # Panics
-    /// If a node has more children than are left to adopt: the tree is not binary.
+    /// If a node has more than two children: the tree is not binary.
     pub fn of<T: Binary + ?Sized>(tree: &T, i: usize, width: usize) -> Family {
-        let mut family = Family { members: [0; LANES], areas: [0.0; LANES], count: 0 };
-        family.replace(tree, 0, 0, tree.children(i));
-        while family.count > 0 && family.count < width {
+        let mut family = Family { members: [0; LANES], areas: [LEAF_AREA; LANES], count: 0 };
+        if tree.children(i).is_empty() {
+            return family;
+        }
+        family.adopt(tree, 0, i);
+        while family.count < width {
             // The first of equals, so that the tree depends on the boxes alone.
-            let mut largest = 0;
+            let (mut largest, mut area) = (0, family.areas[0]);
             for k in 1..family.count {
-                if family.areas[k].total_cmp(&family.areas[largest]).is_gt() {
-                    largest = k;
+                if family.areas[k] > area {
+                    (largest, area) = (k, family.areas[k]);
                 }
             }
-            if family.areas[largest].total_cmp(&LEAF_AREA).is_eq() {
+            if area == LEAF_AREA {
                 break;
             }
-            family.replace(tree, largest, 1, tree.children(family.members[largest] as usize));
+            family.adopt(tree, largest, family.members[largest] as usize);
         }
         family
     }
@@ -79,21 +83,29 @@ impl Family {
         &self.members[..self.count]
     }
 
-    /// Puts `children` where `gone` members were, from `at` on.
-    fn replace<T: Binary + ?Sized>(&mut self, tree: &T, at: usize, gone: usize, children: Range<usize>) {
-        let added = children.len();
-        self.members.copy_within(at + gone..self.count, at + added);
-        self.areas.copy_within(at + gone..self.count, at + added);
+    /// Puts the children of node `i` where member `at` was, if there was any.
+    fn adopt<T: Binary + ?Sized>(&mut self, tree: &T, at: usize, i: usize) {
+        let children = tree.children(i);
+        let more = children.len() - 1;
+        assert!(more <= 1 && self.count + more <= LANES, "the tree is binary");
+        for k in (at + 1..self.count).rev() {
+            (self.members[k + more], self.areas[k + more]) = (self.members[k], self.areas[k]);
+        }
+        self.count = self.count.max(1) + more;
         for (k, child) in (at..).zip(children) {
             self.members[k] = child as u32;
-            self.areas[k] = if tree.children(child).is_empty() { LEAF_AREA } else { tree.bounds(child).half_area() };
+            self.areas[k] = if tree.children(child).is_empty() { LEAF_AREA } else { rank(tree.bounds(child)) };
         }
-        self.count = self.count + added - gone;
     }
 }
 
-/// Below every area in the total order.
-const LEAF_AREA: f32 = f32::from_bits(u32::MAX);
+const LEAF_AREA: i32 = i32::MIN;
+
+/// The area of a box, so that whole numbers compare as [`f32::total_cmp`] does.
+fn rank(bounds: Box32) -> i32 {
+    let bits = bounds.half_area().to_bits() as i32;
+    bits ^ ((bits >> 31) as u32 >> 1) as i32
+}
 
 #[cfg(test)]
 mod tests {
@@ -112,5 +124,38 @@ mod tests {
         assert_eq!(wide[0].children(), 1..9);
         assert_eq!(wide[1..].iter().map(|n| n.first).collect::<Vec<_>>(), (7..15).collect::<Vec<_>>());
         assert!(wide[1..].iter().all(Node::is_leaf));
+    }
+
+    #[test]
+    fn a_family_is_what_plain_lists_make_of_it() {
+        use rand_chacha::rand_core::{RngCore, SeedableRng};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        for nodes in (1..60).chain([400]) {
+            // Few sizes, so that many areas are equal.
+            let mut node = |first: u32| {
+                let hi = crate::math::Vec3::splat((rng.next_u32() % 4) as f32);
+                Node { bounds: Box32 { lo: crate::math::Vec3::ZERO, hi }, ..Node::new(first, first + 1, 0) }
+            };
+            let mut binary = vec![node(0)];
+            while binary.len() < nodes {
+                let (at, first) = (binary.len() * 7 / 11, binary.len() as u32);
+                let leaf = (at..binary.len()).find(|i| binary[*i].is_leaf()).expect("the last is a leaf");
+                let children = if first.is_multiple_of(5) { 1 } else { 2 };
+                (binary[leaf].first_child, binary[leaf].child_count) = (first, children);
+                (0..u32::from(children)).for_each(|c| binary.push(node(first + c)));
+            }
+            for (i, width) in (0..binary.len()).flat_map(|i| [(i, 2), (i, LANES)]) {
+                let mut plain: Vec<usize> = binary[i].children().collect();
+                while plain.len() < width {
+                    let area = |k: &usize| binary[plain[*k]].bounds.half_area();
+                    let inner = (0..plain.len()).filter(|k| !binary[plain[*k]].is_leaf());
+                    // The first of the largest: the last from behind.
+                    let Some(k) = inner.rev().max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
+                    plain.splice(k..=k, binary[plain[k]].children());
+                }
+                let family = Family::of(&binary[..], i, width);
+                assert!(family.members().iter().map(|m| *m as usize).eq(plain), "{nodes} nodes, of {i}");
+            }
+        }
     }
 }

@@ -2,7 +2,7 @@
 //! eight planes are judged at once. Operations and bits are those of `Bins::best`.
 
 use super::bins::{BINS_MAX, Bins, Split, stride};
-use super::bins_x86::{has_avx2, load, load_record};
+use super::bins_x86::{bare, has_avx2, load, load_record};
 use super::record::{Record, Span};
 use std::arch::x86_64::*;
 
@@ -19,23 +19,50 @@ pub fn best(all: &Bins, bins: usize) -> Option<Split> {
 /// Edge lengths of a box.
 #[target_feature(enable = "avx2")]
 #[inline]
-fn edges(span: __m256) -> __m128 {
+pub fn edges(span: __m256) -> __m128 {
     _mm_add_ps(_mm256_extractf128_ps::<1>(span), _mm256_castps256_ps128(span))
 }
 
-/// Half areas of eight boxes by their edge lengths.
+/// Lanes 0 to 2 of eight rows.
 #[target_feature(enable = "avx2")]
 #[inline]
-fn half_areas(e: &[[f32; 4]; 8]) -> __m256 {
+pub fn transposed(e: &[[f32; 4]; 8]) -> [__m256; 3] {
     let pair = |i: usize| _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(load(&e[i])), load(&e[i + 4]));
     let (a, b, c, d) = (pair(0), pair(1), pair(2), pair(3));
     let (xy0, xy1) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
     let (z0, z1) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
     let x = _mm256_shuffle_ps::<0b01_00_01_00>(xy0, xy1);
     let y = _mm256_shuffle_ps::<0b11_10_11_10>(xy0, xy1);
-    let z = _mm256_shuffle_ps::<0b01_00_01_00>(z0, z1);
+    [x, y, _mm256_shuffle_ps::<0b01_00_01_00>(z0, z1)]
+}
+
+/// Half areas of eight boxes by their edge lengths.
+#[target_feature(enable = "avx2")]
+#[inline]
+pub fn half_areas(e: &[[f32; 4]; 8]) -> __m256 {
+    let [x, y, z] = transposed(e);
     let xy_yz = _mm256_add_ps(_mm256_mul_ps(x, y), _mm256_mul_ps(y, z));
     _mm256_add_ps(xy_yz, _mm256_mul_ps(z, x))
+}
+
+/// Sums of all counts before each bin, and of all, in every lane; bins past the last are empty.
+#[target_feature(enable = "avx2")]
+#[inline]
+fn sums(counts: &[u32], before: &mut [u32]) -> __m256i {
+    let mut total = _mm256_setzero_si256();
+    for (out, counts) in before.as_chunks_mut::<8>().0.iter_mut().zip(counts.as_chunks::<8>().0) {
+        // SAFETY: eight counts.
+        let counts = unsafe { _mm256_loadu_si256(counts.as_ptr().cast()) };
+        let pairs = _mm256_add_epi32(counts, _mm256_slli_si256::<4>(counts));
+        let halves = _mm256_add_epi32(pairs, _mm256_slli_si256::<8>(pairs));
+        // The sum of the lower half goes to all of the upper one.
+        let low = _mm256_shuffle_epi32::<0xff>(_mm256_permute2x128_si256::<0x08>(halves, halves));
+        let sums = _mm256_add_epi32(_mm256_add_epi32(halves, low), total);
+        // SAFETY: eight counts.
+        unsafe { _mm256_storeu_si256(out.as_mut_ptr().cast(), _mm256_sub_epi32(sums, counts)) };
+        total = _mm256_permutevar8x32_epi32(sums, _mm256_set1_epi32(7));
+    }
+    total
 }
 
 #[target_feature(enable = "avx2")]
@@ -45,29 +72,24 @@ fn best_256(all: &Bins, bins: usize) -> Option<Split> {
     let mut costs = [f32::INFINITY; 3 * BINS_MAX];
     let mut least = infinite;
     let (mut left, mut right) = ([[0f32; 4]; BINS_MAX], [[0f32; 4]; BINS_MAX]);
-    let mut before = [0u32; BINS_MAX];
+    let mut before = [0u32; 3 * BINS_MAX];
     for axis in 0..3 {
         let spans: &[Span] = &all.spans[axis * stride..][..bins];
-        let counts: &[u32] = &all.counts[axis * stride..][..bins];
         let mut span = load_record(&Record::EMPTY);
         for (out, s) in right.iter_mut().zip(spans).skip(1).rev() {
-            span = _mm256_max_ps(span, load_record(s));
+            span = _mm256_max_ps(span, bare(load_record(s)));
             // SAFETY: four f32.
             unsafe { _mm_storeu_ps(out.as_mut_ptr(), edges(span)) };
         }
         let mut span = load_record(&Record::EMPTY);
-        let mut count = 0;
-        for (i, (s, n)) in spans[..bins - 1].iter().zip(counts).enumerate() {
-            span = _mm256_max_ps(span, load_record(s));
-            count += n;
-            before[i + 1] = count;
+        for (i, s) in spans[..bins - 1].iter().enumerate() {
+            span = _mm256_max_ps(span, bare(load_record(s)));
             // SAFETY: four f32.
             unsafe { _mm_storeu_ps(left[i + 1].as_mut_ptr(), edges(span)) };
         }
-        let total = count + counts[bins - 1];
-        // Past the last plane nothing is right.
-        before[bins..stride].fill(total);
-        let total = _mm256_set1_epi32(total as i32);
+        let counts = &all.counts[axis * stride..][..stride];
+        let before = &mut before[axis * stride..][..stride];
+        let total = sums(counts, before);
         for group in (0..stride).step_by(8) {
             // SAFETY: eight counts of an array whose length is a multiple of eight.
             let n_left = unsafe { _mm256_loadu_si256(before[group..group + 8].as_ptr().cast()) };
@@ -99,7 +121,7 @@ fn best_256(all: &Bins, bins: usize) -> Option<Split> {
         let equal = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_EQ_OQ>(costs, wanted));
         if equal != 0 {
             let i = group + equal.trailing_zeros() as usize;
-            return Some(Split { axis: i / stride, plane: i % stride, cost });
+            return Some(Split { axis: i / stride, plane: i % stride, left: before[i], cost });
         }
     }
     unreachable!("one of the costs is the least")

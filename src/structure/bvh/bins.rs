@@ -72,6 +72,8 @@ pub struct Split {
     pub axis: usize,
     /// First bin of the right side.
     pub plane: usize,
+    /// Records on the left side.
+    pub left: u32,
     /// Half areas of the sides times their counts, summed.
     pub cost: f32,
 }
@@ -101,16 +103,6 @@ impl Bins {
         }
     }
 
-    /// Count and box of some bins of an axis.
-    pub fn fold(&self, axis: usize, range: std::ops::Range<usize>, bins: usize) -> (u32, Span) {
-        let base = axis * stride(bins);
-        let mut total = (0, Record::EMPTY);
-        for i in base + range.start..base + range.end {
-            total = (total.0 + self.counts[i], total.1.union(self.spans[i]));
-        }
-        total
-    }
-
     /// The least cost of all planes that have records on both sides; the first of equals.
     pub fn best(&self, bins: usize) -> Option<Split> {
         let mut best: Option<Split> = None;
@@ -132,7 +124,7 @@ impl Bins {
                 }
                 let cost = span.half_area() * count as f32 + right_area * *right_count as f32;
                 if cost < best.map_or(f32::INFINITY, |b| b.cost) {
-                    best = Some(Split { axis, plane, cost });
+                    best = Some(Split { axis, plane, left: count, cost });
                 }
             }
         }

@@ -1,6 +1,7 @@
 //! AVX2 kernels of `bins`: a record is one register, a box grows by one `max`, and the
 //! side of a record selects addresses instead of branches, which would be guessed wrong
-//! half of the time. The operations are those of the twins, and so are the bits.
+//! half of the time. A bin is counted in a word of its box: a record costs one store a
+//! bin, not two. The operations are those of the twins, and so are the bits.
 
 use super::bins::{BINS_MAX, Bins, Domain, Split, stride};
 use super::record::{Record, Span};
@@ -75,7 +76,7 @@ pub fn load_record(r: &Record) -> __m256 {
 
 #[target_feature(enable = "avx2")]
 #[inline]
-fn store_record(r: &mut Record, v: __m256) {
+pub fn store_record(r: &mut Record, v: __m256) {
     // SAFETY: a record is 8 f32, 32-byte aligned.
     unsafe { _mm256_store_ps(r.0.as_mut_ptr(), v) }
 }
@@ -83,14 +84,14 @@ fn store_record(r: &mut Record, v: __m256) {
 /// The box alone. As numbers, the two words are subnormal, and arithmetic with those is slow.
 #[target_feature(enable = "avx2")]
 #[inline]
-fn bare(r: __m256) -> __m256 {
+pub fn bare(r: __m256) -> __m256 {
     _mm256_blend_ps::<0b1000_1000>(r, _mm256_setzero_ps())
 }
 
 /// Doubled centroid in lanes 0 to 2.
 #[target_feature(enable = "avx2")]
 #[inline]
-fn centre2(r: __m256) -> __m128 {
+pub fn centre2(r: __m256) -> __m128 {
     _mm_sub_ps(_mm256_extractf128_ps::<1>(r), _mm256_castps256_ps128(r))
 }
 
@@ -127,7 +128,7 @@ fn place(centre2: __m128, g: &Grid) -> __m128 {
     _mm_mul_ps(_mm_sub_ps(centre2, g.lo), g.scale)
 }
 
-/// Adds the record to the bin of each axis.
+/// Adds the record to the bin of each axis; [`count`] or [`merge`] come after the last.
 #[target_feature(enable = "avx2")]
 #[inline]
 fn add(into: &mut Bins, r: __m256, place: __m128, rows: &Rows) {
@@ -142,9 +143,10 @@ fn add(into: &mut Bins, r: __m256, place: __m128, rows: &Rows) {
         // `2 * stride(bins) <= 2 * BINS_MAX`.
         unsafe {
             let span = into.spans.get_unchecked_mut(i);
-            let grown = _mm256_max_ps(load_record(span), r);
-            store_record(span, grown);
-            *into.counts.get_unchecked_mut(i) += 1;
+            let old = load_record(span);
+            let counted = _mm256_add_epi32(_mm256_castps_si256(old), _mm256_setr_epi32(0, 0, 0, 1, 0, 0, 0, 0));
+            let grown = _mm256_max_ps(old, r);
+            store_record(span, _mm256_blend_ps::<0b1000_1000>(grown, _mm256_castsi256_ps(counted)));
         }
     }
 }
@@ -168,12 +170,26 @@ fn fill_256(records: &[Record], domain: &Domain, bins: usize, out: &mut Bins, sp
     merge(out, spare, bins);
 }
 
+/// Word of a box in which its bin is counted.
+const COUNT: usize = 3;
+
+/// Takes the counts out of the boxes, whose words then mean nothing.
+#[target_feature(enable = "avx2")]
+#[inline]
+fn count(out: &mut Bins, bins: usize) {
+    let used = 3 * stride(bins);
+    for (count, span) in out.counts[..used].iter_mut().zip(&out.spans[..used]) {
+        *count = span.0[COUNT].to_bits();
+    }
+}
+
+/// [`count`] of two sets in one.
 #[target_feature(enable = "avx2")]
 fn merge(out: &mut Bins, other: &Bins, bins: usize) {
     for i in 0..3 * stride(bins) {
+        out.counts[i] = out.spans[i].0[COUNT].to_bits() + other.spans[i].0[COUNT].to_bits();
         let grown = _mm256_max_ps(load_record(&out.spans[i]), load_record(&other.spans[i]));
         store_record(&mut out.spans[i], grown);
-        out.counts[i] += other.counts[i];
     }
 }
 
@@ -266,10 +282,13 @@ fn deal_256(
         turn ^= turns - 1;
     }
     assert_eq!(to.at, to.size, "the sides are as large as counted");
+    let [[a, b], [c, d]] = sets;
     if turns == 2 {
-        let [[a, b], [c, d]] = sets;
         merge(a, c, bins);
         merge(b, d, bins);
+    } else {
+        count(a, bins);
+        count(b, bins);
     }
 }
 

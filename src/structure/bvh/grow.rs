@@ -3,18 +3,21 @@
 //! Records move between two arrays, dealt stably to the sides of a split, so that a
 //! node is a slice of one of them and its triangles keep the order of the scene. The
 //! box of a child is the union of its bins, known before the records move; so the pass
-//! that moves them also fills the bins of both children. One pass a level.
+//! that moves them also fills the bins of both children. One pass a level. Small nodes
+//! go on in [`small`].
 
-use super::arena::Arena;
-use super::bins::{Bins, Domain, Split, count_left, extent, stride};
+use super::bins::{Bins, Domain, Split, count_left};
 use super::kernel::Kernel;
+use super::pages::{self, Arena};
 use super::record::{self, Record, Span};
+use super::small;
 use super::sweep::Sweep;
 use super::tree::{Slim, Tree};
+use crate::hierarchy::NONE;
 use rayon::prelude::*;
 
 /// Deeper nodes are halved: greedy splits can cut off a record at a time.
-const GREEDY_LEVELS: u8 = 64;
+pub const GREEDY_LEVELS: u8 = 64;
 /// Halving 2^32 records ends within as many levels again.
 const LEVELS: usize = GREEDY_LEVELS as usize + 34;
 /// Nodes with more records are dealt by several tasks.
@@ -27,10 +30,6 @@ const TASK: usize = 1 << 12;
 /// Nodes of up to so many records have at most so many bins an axis.
 const FEW: usize = 64;
 const BINS_OF_FEW: usize = 8;
-
-/// Cost of a step of the walk against that of a triangle.
-const COST_STEP: f32 = 1.0;
-const COST_TRIANGLE: f32 = 1.0;
 
 #[derive(Debug, Clone, Copy)]
 pub struct Grow {
@@ -49,8 +48,7 @@ pub struct Grow {
 struct Job<'a> {
     here: &'a mut [Record],
     there: &'a mut [Record],
-    entries: &'a mut [u32],
-    first: u32,
+    sealed: &'a mut [u64],
     level: u8,
     bounds: Span,
     domain: Domain,
@@ -64,7 +62,6 @@ struct Job<'a> {
 struct Scratch {
     kernel_sets: [Bins; 2],
     own: Bins,
-    keys: Vec<u64>,
     sweep: Sweep,
     /// Bins of children, a pair for each level that a task is within.
     free: Vec<Box<[Bins; 2]>>,
@@ -72,13 +69,7 @@ struct Scratch {
 
 impl Scratch {
     fn new() -> Box<Scratch> {
-        Box::new(Scratch {
-            kernel_sets: [Bins::ZERO; 2],
-            own: Bins::ZERO,
-            keys: Vec::new(),
-            sweep: Sweep::default(),
-            free: Vec::new(),
-        })
+        Box::new(Scratch { kernel_sets: [Bins::ZERO; 2], own: Bins::ZERO, sweep: Sweep::default(), free: Vec::new() })
     }
 
     fn pair(&mut self) -> Box<[Bins; 2]> {
@@ -87,18 +78,17 @@ impl Scratch {
 }
 
 impl Grow {
-    /// Builds over `records`; the numbers of their triangles come out leaf by leaf.
-    pub fn run(&self, mut records: Arena) -> (Vec<Slim>, Vec<u32>) {
-        let mut entries = vec![0; records.len()];
+    /// Builds over `records`; their keys (see [`Record::key`]) come out leaf by leaf.
+    pub fn run(&self, mut records: Arena) -> (Vec<Slim>, Vec<u64>) {
+        let mut sealed = pages::zeros(records.len());
         if records.is_empty() {
-            return (Vec::new(), entries);
+            return (Vec::new(), sealed);
         }
         let mut there = Arena::zeroed(records.len());
         let job = Job {
             here: &mut records,
             there: &mut there,
-            entries: &mut entries,
-            first: 0,
+            sealed: &mut sealed,
             level: 0,
             bounds: Record::EMPTY,
             domain: Domain::over([0.0; 3], [0.0; 3], self.bins),
@@ -106,20 +96,20 @@ impl Grow {
             binned: false,
         };
         let tree = self.plant(job, &Bins::ZERO, &mut Scratch::new());
-        (tree.join(), entries)
+        (tree.join(), sealed)
     }
 
     /// Grows large nodes here and their subtrees in tasks.
     fn plant(&self, mut job: Job, bins: &Bins, scratch: &mut Scratch) -> Tree {
-        if job.here.len() <= TASK || rayon::current_num_threads() == 1 {
-            let mut out = Vec::with_capacity(self.likely_nodes(job.here.len()));
+        if job.here.len() <= TASK.max(self.sweep) || rayon::current_num_threads() == 1 {
+            let mut out = pages::with_capacity(self.likely_nodes(job.here.len()));
             out.push(Slim::UNBORN);
             self.grow(job, bins, scratch, &mut out, 0);
             return Tree::Part(out);
         }
         let mut pair = scratch.pair();
         let Some(split) = self.divide(&mut job, bins, &mut pair, scratch) else {
-            return Tree::Part(vec![seal(job, scratch)]);
+            return Tree::Part(vec![seal(self.kernel, job.here, job.sealed, &job.bounds)]);
         };
         let bounds = job.bounds.bounds();
         let [left, right] = job.sides(split);
@@ -136,16 +126,20 @@ impl Grow {
     }
 
     fn grow(&self, mut job: Job, bins: &Bins, scratch: &mut Scratch, out: &mut Vec<Slim>, slot: usize) {
+        if job.here.len() <= self.sweep && !self.median {
+            let Job { here, there, sealed, level, bounds, .. } = job;
+            return small::grow(self, [here, there], sealed, level, bounds, &mut scratch.sweep, out, slot);
+        }
         let mut pair = scratch.pair();
         if let Some(split) = self.divide(&mut job, bins, &mut pair, scratch) {
             let child = out.len();
-            out[slot] = Slim { bounds: job.bounds.bounds(), first: child as u32, count: 0 };
+            out[slot] = Slim { bounds: job.bounds.bounds(), child: child as u32, count: job.here.len() as u32 };
             out.extend([Slim::UNBORN; 2]);
             let [left, right] = job.sides(split);
             self.grow(left, &pair[0], scratch, out, child);
             self.grow(right, &pair[1], scratch, out, child + 1);
         } else {
-            out[slot] = seal(job, scratch);
+            out[slot] = seal(self.kernel, job.here, job.sealed, &job.bounds);
         }
         scratch.free.push(pair);
     }
@@ -160,9 +154,6 @@ impl Grow {
         if self.median || job.level >= GREEDY_LEVELS {
             return Some(self.halve(job));
         }
-        if n <= self.sweep {
-            return self.sweep(job, &mut scratch.sweep);
-        }
         let mut split = if job.binned { self.kernel.best(bins, job.bins) } else { None };
         let mut from = bins;
         if split.is_none_or(|s| s.cost == 0.0) {
@@ -173,28 +164,18 @@ impl Grow {
             split = self.kernel.best(from, job.bins);
         }
         let cost = split.map_or(f32::INFINITY, |s| s.cost);
-        if n <= self.leaf_size && !pays(job, cost) {
+        if n <= self.leaf_size && !small::pays(&job.bounds, n, cost) {
             return None;
         }
         // Without area every plane is as good: halve.
         let Some(split) = split.filter(|s| s.cost > 0.0) else { return Some(self.halve(job)) };
-        let sides = [0..split.plane, split.plane..job.bins];
-        let [left, right] = sides.map(|range| from.fold(split.axis, range, job.bins));
-        let larger = left.0.max(right.0) as usize;
+        let bounds = self.kernel.sides(from, &split, job.bins);
+        let left = split.left as usize;
+        let larger = left.max(n - left);
         let bins_below = self.bins_for(larger);
-        let below = [(0, left.1), (1, right.1)].map(|(side, bounds)| {
-            let (lo, hi) = centres_below(from, job, &split, side, &bounds);
-            Domain::over(lo, hi, bins_below)
-        });
+        let below = self.kernel.below(from, &job.domain, job.bins, &split, &bounds, bins_below);
         let unbinned = if self.by_cost { 1 } else { self.leaf_size }.max(self.sweep);
-        let d = Divided {
-            left: left.0 as usize,
-            bounds: [left.1, right.1],
-            domains: below,
-            bins: bins_below,
-            binned: larger > unbinned,
-            moved: true,
-        };
+        let d = Divided { left, bounds, domains: below, bins: bins_below, binned: larger > unbinned, moved: true };
         self.deal(job, &split, &d, pair, scratch);
         Some(d)
     }
@@ -267,38 +248,23 @@ impl Grow {
         job.domain = Domain::over(lo, hi, job.bins);
     }
 
-    /// Divides a small node where the exact sweep says.
-    fn sweep(&self, job: &mut Job, sweep: &mut Sweep) -> Option<Divided> {
-        let best = sweep.best(job.here);
-        if job.bounds == Record::EMPTY {
-            job.bounds = self.kernel.extent(job.here).0;
-        }
-        if job.here.len() <= self.leaf_size && !pays(job, best.map_or(f32::INFINITY, |c| c.cost)) {
-            return None;
-        }
-        let Some(cut) = best.filter(|c| c.cost > 0.0) else { return Some(self.halve(job)) };
-        sweep.arrange(job.here, cut.axis, job.there);
-        Some(Divided {
-            left: cut.left,
-            bounds: cut.bounds,
-            domains: [job.domain; 2],
-            bins: job.bins,
-            binned: false,
-            moved: true,
-        })
-    }
-
-    /// Object median along the longest axis of the centroids; ties by triangle.
     fn halve(&self, job: &mut Job) -> Divided {
-        self.measure(job);
-        let axis = job.domain.longest_axis();
-        let left = job.here.len() / 2;
-        let by_centre =
-            |a: &Record, b: &Record| a.centre2(axis).total_cmp(&b.centre2(axis)).then(a.triangle().cmp(&b.triangle()));
-        job.here.select_nth_unstable_by(left, by_centre);
+        let left;
+        (left, job.bounds) = halve(self.kernel, job.here);
         let unknown = [Record::EMPTY; 2];
         Divided { left, bounds: unknown, domains: [job.domain; 2], bins: job.bins, binned: false, moved: false }
     }
+}
+
+/// Object median along the longest axis of the centroids; ties by triangle.
+pub fn halve(kernel: Kernel, records: &mut [Record]) -> (usize, Span) {
+    let (span, lo, hi) = kernel.extent(records);
+    let axis = Domain::over(lo, hi, 1).longest_axis();
+    let left = records.len() / 2;
+    let by_centre =
+        |a: &Record, b: &Record| a.centre2(axis).total_cmp(&b.centre2(axis)).then(a.triangle().cmp(&b.triangle()));
+    records.select_nth_unstable_by(left, by_centre);
+    (left, span)
 }
 
 /// What became of a node's records.
@@ -316,57 +282,26 @@ impl<'a> Job<'a> {
     fn sides(self, d: Divided) -> [Job<'a>; 2] {
         let (here, there) = if d.moved { (self.there, self.here) } else { (self.here, self.there) };
         let (here, there) = (here.split_at_mut(d.left), there.split_at_mut(d.left));
-        let entries = self.entries.split_at_mut(d.left);
+        let sealed = self.sealed.split_at_mut(d.left);
         let level = self.level + 1;
         debug_assert!(usize::from(level) < LEVELS);
-        let job = |here, there, entries, first, side: usize| Job {
+        let job = |here, there, sealed, side: usize| Job {
             here,
             there,
-            entries,
-            first,
+            sealed,
             level,
             bounds: d.bounds[side],
             domain: d.domains[side],
             bins: d.bins,
             binned: d.binned,
         };
-        let middle = self.first + d.left as u32;
-        [job(here.0, there.0, entries.0, self.first, 0), job(here.1, there.1, entries.1, middle, 1)]
+        [job(here.0, there.0, sealed.0, 0), job(here.1, there.1, sealed.1, 1)]
     }
 }
 
-/// Where the doubled centroids of a side may lie: in its box, and in bins that hold any.
-fn centres_below(from: &Bins, job: &Job, split: &Split, side: usize, bounds: &Span) -> ([f32; 3], [f32; 3]) {
-    let (mut lo, mut hi) = ([0.0; 3], [0.0; 3]);
-    let (domain, bins) = (&job.domain, job.bins);
-    for axis in 0..3 {
-        let counts = &from.counts[axis * stride(bins)..][..bins];
-        let width = (domain.hi[axis] - domain.lo[axis]) / bins as f32;
-        let (mut first, mut end) = (0, bins);
-        if axis == split.axis {
-            if side == 0 { end = split.plane } else { first = split.plane }
-        }
-        while first < end && counts[first] == 0 {
-            first += 1;
-        }
-        while end > first && counts[end - 1] == 0 {
-            end -= 1;
-        }
-        let at = |i: usize| if i == bins { domain.hi[axis] } else { domain.lo[axis] + i as f32 * width };
-        lo[axis] = record::larger(-2.0 * bounds.0[axis], at(first));
-        hi[axis] = -record::larger(-2.0 * bounds.0[4 + axis], -at(end));
-    }
-    (lo, hi)
-}
-
-/// Whether dividing costs less than the triangles of the node.
-fn pays(job: &Job, cost: f32) -> bool {
-    let area = job.bounds.half_area();
-    COST_STEP * area + COST_TRIANGLE * cost < COST_TRIANGLE * area * job.here.len() as f32
-}
-
-fn seal(job: Job, scratch: &mut Scratch) -> Slim {
-    record::seal(job.here, job.entries, &mut scratch.keys);
-    let bounds = if job.bounds == Record::EMPTY { extent(job.here).0 } else { job.bounds };
-    Slim { bounds: bounds.bounds(), first: job.first, count: job.here.len() as u32 }
+/// The leaf of all of `records`; `bounds` may be unknown.
+pub fn seal(kernel: Kernel, records: &[Record], sealed: &mut [u64], bounds: &Span) -> Slim {
+    record::seal(records, sealed);
+    let bounds = if bounds.is_empty() { kernel.extent(records).0 } else { *bounds };
+    Slim { bounds: bounds.bounds(), child: NONE, count: records.len() as u32 }
 }

@@ -2,10 +2,10 @@
 
 use super::bins::{self, Bins, Domain, Split};
 use super::record::{self, Record, Span};
+use super::sides;
+use super::sweep::{Cut, Sweep};
 #[cfg(target_arch = "x86_64")]
-use super::record_x86;
-#[cfg(target_arch = "x86_64")]
-use super::{best_x86, bins_x86};
+use super::{best_x86, bins_x86, record_x86, sides_x86, sweep_x86};
 use crate::scene::Scene;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +70,38 @@ impl Kernel {
             Kernel::Scalar => all.best(bins),
             #[cfg(target_arch = "x86_64")]
             Kernel::Avx2 => best_x86::best(all, bins),
+        }
+    }
+
+    pub fn sides(self, from: &Bins, split: &Split, bins: usize) -> [Span; 2] {
+        match self {
+            Kernel::Scalar => sides::sides(from, split, bins),
+            #[cfg(target_arch = "x86_64")]
+            Kernel::Avx2 => sides_x86::sides(from, split, bins),
+        }
+    }
+
+    pub fn below(
+        self,
+        from: &Bins,
+        domain: &Domain,
+        bins: usize,
+        split: &Split,
+        bounds: &[Span; 2],
+        bins_below: usize,
+    ) -> [Domain; 2] {
+        match self {
+            Kernel::Scalar => sides::below(from, domain, bins, split, bounds, bins_below),
+            #[cfg(target_arch = "x86_64")]
+            Kernel::Avx2 => sides_x86::below(from, domain, bins, split, bounds, bins_below),
+        }
+    }
+
+    pub fn cut(self, records: &[Record], out: &mut [Record], sweep: &mut Sweep) -> Option<Cut> {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Kernel::Avx2 if records.len() <= sweep_x86::MOST => sweep_x86::cut(records, out),
+            _ => sweep.cut(records, out),
         }
     }
 

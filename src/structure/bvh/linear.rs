@@ -5,8 +5,10 @@
 //! Ranges that are still too large where those bits end are sorted again by the other
 //! 31; where all 63 are equal, the range is halved.
 
+use super::pages;
 use super::record::{self, Record, Span};
 use super::tree::{Slim, Tree};
+use crate::hierarchy::NONE;
 use crate::math::DVec3;
 use crate::scene::Scene;
 use crate::structure::builder::morton::{Lattice, radix_sort};
@@ -27,10 +29,10 @@ struct Linear<'a> {
 }
 
 /// Builds over all triangles; `records` are those of the scene, in its order.
-pub fn build(scene: &Scene, records: &[Record], leaf_size: usize) -> (Vec<Slim>, Vec<u32>) {
-    let mut entries = vec![0; records.len()];
+pub fn build(scene: &Scene, records: &[Record], leaf_size: usize) -> (Vec<Slim>, Vec<u64>) {
+    let mut sealed = pages::zeros(records.len());
     if records.is_empty() {
-        return (Vec::new(), entries);
+        return (Vec::new(), sealed);
     }
     let linear = Linear { leaf_size, records, scene, lattice: Lattice::new(&scene_bounds(scene), 21) };
     let keyed = (0..records.len() as u32)
@@ -39,8 +41,8 @@ pub fn build(scene: &Scene, records: &[Record], leaf_size: usize) -> (Vec<Slim>,
         .map(|t| (linear.code(t) >> LOWER_BITS) << 32 | u64::from(t))
         .collect();
     let mut sorted: Vec<u64> = radix_sort(keyed, UPPER_BITS, |k| k >> 32);
-    let (tree, _) = linear.plant(&mut sorted, &mut entries, 0, false);
-    (tree.join(), entries)
+    let (tree, _) = linear.plant(&mut sorted, &mut sealed, false);
+    (tree.join(), sealed)
 }
 
 impl Linear<'_> {
@@ -50,52 +52,44 @@ impl Linear<'_> {
     }
 
     /// Large nodes here, their subtrees in tasks. `lower` tells which bits are in the keys.
-    fn plant(&self, keys: &mut [u64], entries: &mut [u32], first: u32, lower: bool) -> (Tree, Span) {
+    fn plant(&self, keys: &mut [u64], sealed: &mut [u64], lower: bool) -> (Tree, Span) {
         if keys.len() <= TASK.max(self.leaf_size) || rayon::current_num_threads() == 1 {
-            let mut out = vec![Slim::UNBORN];
-            let span = self.grow(keys, entries, first, lower, &mut Vec::new(), &mut out, 0);
+            let leaf = self.leaf_size.div_ceil(2);
+            let mut out = pages::with_capacity(2 * keys.len().div_ceil(leaf));
+            out.push(Slim::UNBORN);
+            let span = self.grow(keys, sealed, lower, &mut out, 0);
             return (Tree::Part(out), span);
         }
         let (left, lower) = self.divide(keys, lower);
         let (a, b) = keys.split_at_mut(left);
-        let (to_a, to_b) = entries.split_at_mut(left);
-        let ((a, span_a), (b, span_b)) =
-            rayon::join(|| self.plant(a, to_a, first, lower), || self.plant(b, to_b, first + left as u32, lower));
+        let (to_a, to_b) = sealed.split_at_mut(left);
+        let ((a, span_a), (b, span_b)) = rayon::join(|| self.plant(a, to_a, lower), || self.plant(b, to_b, lower));
         let span = span_a.union(span_b);
         (Tree::Fork(span.bounds(), Box::new([a, b])), span)
     }
 
-    fn grow(
-        &self,
-        keys: &mut [u64],
-        entries: &mut [u32],
-        first: u32,
-        lower: bool,
-        leaf_keys: &mut Vec<u64>,
-        out: &mut Vec<Slim>,
-        slot: usize,
-    ) -> Span {
+    fn grow(&self, keys: &mut [u64], sealed: &mut [u64], lower: bool, out: &mut Vec<Slim>, slot: usize) -> Span {
+        let count = keys.len() as u32;
         if keys.len() <= self.leaf_size {
             let mut span = Record::EMPTY;
-            leaf_keys.clear();
-            for k in &*keys {
+            for (k, out) in keys.iter().zip(&mut *sealed) {
                 let r = self.records[*k as u32 as usize];
                 span = span.union(r.bare());
-                leaf_keys.push(r.key());
+                *out = r.key();
             }
-            record::write_sorted(leaf_keys, entries);
-            out[slot] = Slim { bounds: span.bounds(), first, count: keys.len() as u32 };
+            record::sort(sealed);
+            out[slot] = Slim { bounds: span.bounds(), child: NONE, count };
             return span;
         }
         let (left, lower) = self.divide(keys, lower);
         let child = out.len();
         out.extend([Slim::UNBORN; 2]);
         let (a, b) = keys.split_at_mut(left);
-        let (to_a, to_b) = entries.split_at_mut(left);
-        let span_a = self.grow(a, to_a, first, lower, leaf_keys, out, child);
-        let span_b = self.grow(b, to_b, first + left as u32, lower, leaf_keys, out, child + 1);
+        let (to_a, to_b) = sealed.split_at_mut(left);
+        let span_a = self.grow(a, to_a, lower, out, child);
+        let span_b = self.grow(b, to_b, lower, out, child + 1);
         let span = span_a.union(span_b);
-        out[slot] = Slim { bounds: span.bounds(), first: child as u32, count: 0 };
+        out[slot] = Slim { bounds: span.bounds(), child: child as u32, count };
         span
     }
 

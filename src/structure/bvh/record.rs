@@ -5,8 +5,8 @@
 //! all lanes and twice the centroid is one difference of the halves. Zeros are made
 //! positive in both halves: `max` of zeros with two signs would depend on the processor.
 
-use super::arena::Arena;
 use super::kernel::Kernel;
+use super::pages::Arena;
 use crate::math::{Box32, Vec3};
 use crate::scene::Scene;
 use rayon::prelude::*;
@@ -25,7 +25,10 @@ const TRIANGLE: usize = 3;
 const MATERIAL: usize = 7;
 
 impl Record {
-    pub const EMPTY: Span = Record([f32::NEG_INFINITY; 8]);
+    pub const EMPTY: Span = {
+        const NONE: f32 = f32::NEG_INFINITY;
+        Record([NONE, NONE, NONE, 0.0, NONE, NONE, NONE, 0.0])
+    };
 
     pub fn new(bounds: Box32, triangle: u32, material: u32) -> Record {
         let (lo, hi) = (bounds.lo, bounds.hi);
@@ -68,6 +71,12 @@ impl Record {
         Box32 { lo: Vec3::new(-v[0], -v[1], -v[2]), hi: Vec3::new(v[4], v[5], v[6]) }
     }
 
+    /// Whether this is the box of nothing, or not known yet.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.0[0] == f32::NEG_INFINITY
+    }
+
     /// Half the surface of a box that is not empty.
     #[inline]
     pub fn half_area(&self) -> f32 {
@@ -99,17 +108,15 @@ pub fn make(scene: &Scene, first: u32, out: &mut [Record]) {
     }
 }
 
-/// Writes the numbers of a leaf's triangles, by material, ties by number.
-pub fn seal(leaf: &[Record], entries: &mut [u32], keys: &mut Vec<u64>) {
-    keys.clear();
-    keys.extend(leaf.iter().map(Record::key));
-    write_sorted(keys, entries);
+/// Writes the keys of a leaf's records in order: by material, ties by number.
+pub fn seal(leaf: &[Record], sealed: &mut [u64]) {
+    sealed.iter_mut().zip(leaf).for_each(|(key, r)| *key = r.key());
+    sort(sealed);
 }
 
-/// Writes the triangles of `keys` (see [`Record::key`]) in their order.
-pub fn write_sorted(keys: &mut [u64], entries: &mut [u32]) {
+/// Puts the keys of a leaf in order.
+pub fn sort(keys: &mut [u64]) {
     if !keys.is_sorted() {
         keys.sort_unstable();
     }
-    entries.iter_mut().zip(keys).for_each(|(e, k)| *e = *k as u32);
 }

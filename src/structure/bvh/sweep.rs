@@ -2,7 +2,8 @@
 //! each axis (Goldsmith & Salmon 1987; Wald 2007 compares his bins with it).
 //!
 //! Small nodes are divided so, where it is no dearer than bins; a tree that is built so
-//! throughout is the twin that bins are measured against.
+//! throughout is the twin that bins are measured against. The kernel for few records is in
+//! `sweep_x86`.
 
 use super::record::{Record, Span};
 
@@ -24,8 +25,17 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// The least cost; the first of equals by axis, then by count. `None` for one record.
-    pub fn best(&mut self, records: &[Record]) -> Option<Cut> {
+    /// The least cost, the first of equals by axis, then by count; `None` for one record, or
+    /// where no cost is finite. `out` gets the records in the order of the axis.
+    pub fn cut(&mut self, records: &[Record], out: &mut [Record]) -> Option<Cut> {
+        let best = self.best(records)?;
+        for (out, (_, i)) in out.iter_mut().zip(&self.orders[best.axis]) {
+            *out = records[*i as usize];
+        }
+        Some(best)
+    }
+
+    fn best(&mut self, records: &[Record]) -> Option<Cut> {
         let n = records.len();
         let mut best: Option<Cut> = None;
         for (axis, order) in self.orders.iter_mut().enumerate() {
@@ -49,13 +59,6 @@ impl Sweep {
             }
         }
         best
-    }
-
-    /// Writes the records in the order that the last [`Sweep::best`] found on `axis`.
-    pub fn arrange(&self, records: &[Record], axis: usize, out: &mut [Record]) {
-        for (out, (_, i)) in out.iter_mut().zip(&self.orders[axis]) {
-            *out = records[*i as usize];
-        }
     }
 }
 

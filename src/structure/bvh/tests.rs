@@ -7,7 +7,7 @@ use super::kernel::Kernel;
 use super::record::{self, Record};
 use super::sweep::Sweep;
 use super::tree::Slim;
-use super::{Bvh, lay, linear, sah_cost, tree};
+use super::{Bvh, lay, linear, sah_cost, sides, tree};
 use crate::hierarchy::LANES;
 use crate::math::{Aabb, Box32, DVec3, Vec3};
 use crate::scene::Scene;
@@ -78,7 +78,8 @@ fn bits(r: &[Record]) -> Vec<[u32; 8]> {
 }
 
 fn used(b: &Bins, bins: usize) -> (Vec<[u32; 8]>, Vec<u32>) {
-    (bits(&b.spans[..3 * stride(bins)]), b.counts[..3 * stride(bins)].to_vec())
+    let boxes: Vec<Record> = b.spans[..3 * stride(bins)].iter().map(|s| s.bare()).collect();
+    (bits(&boxes), b.counts[..3 * stride(bins)].to_vec())
 }
 
 #[test]
@@ -129,7 +130,18 @@ fn kernels_give_the_bits_of_their_twins() {
                 kernel.fill(input, &domain, bins, &mut own, &mut spare[0]);
                 assert_eq!(used(&own, bins), used(&twin, bins), "{kernel:?}, {bins} bins");
                 assert_eq!(kernel.best(&own, bins), best, "{kernel:?}, {bins} bins");
-                for split in best.into_iter().chain([0, 1, 2].map(|axis| Split { axis, plane: 1, cost: 0.0 })) {
+                if let Some(split) = best {
+                    let sides = sides::sides(&twin, &split, bins);
+                    assert_eq!(bits(&kernel.sides(&twin, &split, bins)), bits(&sides), "{kernel:?}, {bins} bins");
+                    assert_eq!(split.left as usize, bins::count_left(input, &domain, &split));
+                    for bins_below in [bins, 7] {
+                        let of = |k: Kernel| k.below(&twin, &domain, bins, &split, &sides, bins_below);
+                        let (own, twin) = (of(kernel), of(Kernel::Scalar));
+                        assert_eq!(format!("{own:?}"), format!("{twin:?}"), "{kernel:?}, {bins} bins");
+                    }
+                }
+                for split in best.into_iter().chain([0, 1, 2].map(|axis| Split { axis, plane: 1, left: 0, cost: 0.0 }))
+                {
                     let left = bins::count_left(input, &domain, &split);
                     let deal = |kernel: Kernel| {
                         let mut out = vec![Record::EMPTY; input.len()];
@@ -160,14 +172,14 @@ fn a_side_that_is_too_small_is_a_panic() {
     let (_, lo, hi) = bins::extent(&input);
     let mut out = vec![Record::EMPTY; input.len()];
     let (a, b) = out.split_at_mut(1);
-    Kernel::fastest().part(&input, [a, b], &Domain::over(lo, hi, 8), &Split { axis: 0, plane: 4, cost: 0.0 });
+    Kernel::fastest().part(&input, [a, b], &Domain::over(lo, hi, 8), &Split { axis: 0, plane: 4, left: 1, cost: 0.0 });
 }
 
 fn grow(kernel: Kernel, leaf_size: usize, by_cost: bool, sweep: usize) -> Grow {
     Grow { leaf_size, bins: 16, median: false, by_cost, sweep, kernel }
 }
 
-fn arena(scene: &Scene, kernel: Kernel) -> super::arena::Arena {
+fn arena(scene: &Scene, kernel: Kernel) -> super::pages::Arena {
     record::records(scene, kernel)
 }
 
@@ -189,7 +201,7 @@ fn cost(nodes: &[Slim]) -> f64 {
         let e = (s.bounds.hi - s.bounds.lo).as_dvec3();
         e.x * e.y + e.y * e.z + e.z * e.x
     };
-    nodes.iter().map(|s| area(s) * f64::from(s.count.max(1))).sum::<f64>() / area(&nodes[0])
+    nodes.iter().map(|s| area(s) * f64::from(if s.is_leaf() { s.count } else { 1 })).sum::<f64>() / area(&nodes[0])
 }
 
 #[test]
@@ -223,12 +235,10 @@ fn the_sweep_finds_the_least_of_all_planes() {
                 least = least.min(area(a) * left as f32 + area(b) * b.len() as f32);
             }
         }
-        let mut sweep = Sweep::default();
-        let best = sweep.best(&input);
+        let mut out = vec![Record::EMPTY; input.len()];
+        let best = Sweep::default().cut(&input, &mut out);
         assert_eq!(best.map_or(f32::INFINITY, |c| c.cost), least);
         if let Some(cut) = best {
-            let mut out = vec![Record::EMPTY; input.len()];
-            sweep.arrange(&input, cut.axis, &mut out);
             assert!(out.is_sorted_by_key(|r| r.centre2(cut.axis)));
             for (side, part) in [&out[..cut.left], &out[cut.left..]].into_iter().enumerate() {
                 let naive = part.iter().fold(Record::EMPTY, |s, r| s.union(*r));
@@ -236,6 +246,33 @@ fn the_sweep_finds_the_least_of_all_planes() {
             }
         }
     }
+}
+
+#[test]
+fn every_kernel_sweeps_alike() {
+    let mut cut = [0; 2];
+    let mut endless = records(&soup(7, 40, 1.0, DVec3::ZERO));
+    for (i, r) in endless.iter_mut().enumerate() {
+        r.0[[1, 4, 6][i % 3]] = if i % 5 < 2 { f32::INFINITY } else { r.0[4] };
+    }
+    let few = |all: &[Record]| all[..all.len().min(130)].to_vec();
+    for input in scenes().iter().map(|s| few(&records(s))).chain([endless, records(&soup(8, 130, 20.0, DVec3::ZERO))]) {
+        for (n, first) in (1..=17).flat_map(|n| (0..input.len().saturating_sub(n)).step_by(7).map(move |f| (n, f))) {
+            let part = &input[first..first + n];
+            let of = |kernel: Kernel| {
+                let mut out = vec![Record::EMPTY; n];
+                let best = kernel.cut(part, &mut out, &mut Sweep::default());
+                // Signs of zeros, too; and what is not a number is like itself.
+                (best.map(|c| (c.axis, c.left, c.cost.to_bits(), bits(&c.bounds))), bits(&out))
+            };
+            let twin = of(Kernel::Scalar);
+            cut[usize::from(twin.0.is_some())] += 1;
+            for kernel in Kernel::all() {
+                assert_eq!(of(kernel), twin, "{kernel:?}, {n} records from {first}");
+            }
+        }
+    }
+    assert!(cut[0] > 20 && cut[1] > 1000, "{cut:?}");
 }
 
 /// Lauterbach's recursion on whole codes: the ranges of the leaves.
@@ -272,16 +309,16 @@ fn the_linear_build_is_the_plain_recursion_on_whole_codes() {
         for leaf_size in [1, 7, 64] {
             let mut expected = Vec::new();
             plain(&codes, 0, leaf_size, &mut expected);
-            let (nodes, entries) = linear::build(&scene, &records(&scene), leaf_size);
-            let mut leaves: Vec<(u32, u32)> =
-                nodes.iter().filter(|n| n.count > 0).map(|n| (n.first, n.count)).collect();
+            let (slim, sealed) = linear::build(&scene, &records(&scene), leaf_size);
+            let leaf = |n: &builder::Node| n.is_leaf().then_some((n.first, n.end - n.first));
+            let mut leaves: Vec<(u32, u32)> = tree::nodes(&slim).iter().filter_map(leaf).collect();
             leaves.sort_unstable();
             assert_eq!(leaves, expected);
             for (first, count) in leaves {
                 let range = first as usize..(first + count) as usize;
                 let mut triangles: Vec<u32> = order[range.clone()].iter().map(|o| o.1).collect();
                 triangles.sort_unstable_by_key(|t| (scene.material_id[*t as usize], *t));
-                assert_eq!(entries[range], triangles);
+                assert!(sealed[range].iter().map(|key| *key as u32).eq(triangles));
             }
         }
     }
@@ -293,11 +330,13 @@ fn the_layout_is_that_of_collapse_and_flatten() {
     for scene in scenes().iter().chain([&scene]) {
         for (leaf_size, by_cost) in [(1, false), (9, false), (64, true)] {
             let kernel = Kernel::fastest();
-            let (tree, entries) = grow(kernel, leaf_size, by_cost, 8).run(arena(scene, kernel));
+            let (tree, sealed) = grow(kernel, leaf_size, by_cost, 8).run(arena(scene, kernel));
+            let entries: Vec<u32> = sealed.iter().map(|key| *key as u32).collect();
             let binary = tree::nodes(&tree);
             for (width, nodes) in [(2, binary.clone()), (LANES, collapse::collapse(&binary))] {
-                let h = lay::lay(scene, &tree, entries.clone(), width, leaf_size as u32);
+                let h = lay::lay(scene, &tree, &sealed, width, leaf_size as u32);
                 let twin = builder::flatten(scene, &nodes, entries.clone(), None);
+                assert!(h.entries == twin.entries);
                 assert!(h.bounds == twin.bounds && h.links == twin.links && h.parent == twin.parent);
                 assert!(h.root_blocks == twin.root_blocks && h.material_run == twin.material_run);
                 assert_eq!(h.stats, builder::stats(&binary, leaf_size as u64));

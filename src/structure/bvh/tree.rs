@@ -5,20 +5,25 @@ use crate::math::Box32;
 #[cfg(test)]
 use crate::structure::builder::Node;
 
-/// Children lie side by side and after their parent.
+/// Children lie side by side and after their parent; the entries of the left one come
+/// first. So counts alone tell which entries belong to a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slim {
     pub bounds: Box32,
-    /// First entry of a leaf, first child of an inner node.
-    pub first: u32,
-    /// Entries of a leaf; 0 for an inner node.
+    /// First of two children; [`NONE`] for a leaf.
+    pub child: u32,
+    /// Entries of the subtree.
     pub count: u32,
 }
 
 const _: () = assert!(size_of::<Slim>() == 32);
 
 impl Slim {
-    pub const UNBORN: Slim = Slim { bounds: Box32::EMPTY, first: NONE, count: 0 };
+    pub const UNBORN: Slim = Slim { bounds: Box32::EMPTY, child: NONE, count: 0 };
+
+    pub fn is_leaf(&self) -> bool {
+        self.child == NONE
+    }
 }
 
 /// A tree whose parts grew in tasks of their own.
@@ -55,17 +60,18 @@ impl Tree {
                 // Node 0 goes to the slot, the others behind what is there.
                 let base = out.len() as u32 - 1;
                 let mut moved =
-                    nodes.into_iter().map(|n| Slim { first: if n.count == 0 { n.first + base } else { n.first }, ..n });
+                    nodes.into_iter().map(|n| Slim { child: if n.is_leaf() { NONE } else { n.child + base }, ..n });
                 out[slot] = moved.next().expect("a part has a root");
                 out.extend(moved);
             }
             Tree::Fork(bounds, sides) => {
-                let first = out.len();
-                out[slot] = Slim { bounds, first: first as u32, count: 0 };
+                let child = out.len();
                 out.extend([Slim::UNBORN; 2]);
                 let [left, right] = *sides;
-                left.lay(out, first);
-                right.lay(out, first + 1);
+                left.lay(out, child);
+                right.lay(out, child + 1);
+                let count = out[child].count + out[child + 1].count;
+                out[slot] = Slim { bounds, child: child as u32, count };
             }
         }
     }
@@ -75,19 +81,15 @@ impl Tree {
 #[cfg(test)]
 pub fn nodes(slim: &[Slim]) -> Vec<Node> {
     let mut nodes: Vec<Node> = Vec::with_capacity(slim.len());
-    nodes
-        .extend(slim.iter().map(|s| Node { bounds: s.bounds, ..Node::new(s.first, s.first.wrapping_add(s.count), 0) }));
-    for (i, s) in slim.iter().enumerate().filter(|(_, s)| s.count == 0) {
-        let level = nodes[i].level + 1;
-        nodes[i].first_child = s.first;
-        nodes[i].child_count = 2;
-        nodes[s.first as usize].level = level;
-        nodes[s.first as usize + 1].level = level;
-    }
-    for i in (0..slim.len()).rev().filter(|i| slim[*i].count == 0) {
-        let child = slim[i].first as usize;
-        let (first, end) = (nodes[child].first, nodes[child + 1].end);
-        (nodes[i].first, nodes[i].own_end, nodes[i].end) = (first, first, end);
+    nodes.extend(slim.iter().map(|s| Node { bounds: s.bounds, ..Node::new(0, s.count, 0) }));
+    for (i, s) in slim.iter().enumerate().filter(|(_, s)| !s.is_leaf()) {
+        let (first, end, level) = (nodes[i].first, nodes[i].end, nodes[i].level + 1);
+        let child = s.child as usize;
+        let middle = first + slim[child].count;
+        (nodes[i].first_child, nodes[i].child_count, nodes[i].own_end) = (s.child, 2, first);
+        for (c, first, end) in [(child, first, middle), (child + 1, middle, end)] {
+            nodes[c] = Node { bounds: slim[c].bounds, ..Node::new(first, end, level) };
+        }
     }
     nodes
 }

@@ -139,4 +139,17 @@ fn mistaken_parameters_are_named() {
     assert!(error("bvh:leafsize=3").contains("did you mean `leaf_size`?"));
     assert!(error("bvh:bins=1").contains("from 2 to 32"));
     assert!(error("bvh:stop=never").contains("\"size\", \"cost\""));
+    // What has no effect is no parameter either.
+    for split in ["median", "morton"] {
+        for (stated, key) in [("bins=32", "bins"), ("stop=cost", "stop")] {
+            let message = error(&format!("bvh:split={split},{stated}"));
+            assert!(message.contains(&format!("leave `{key}` out")));
+            assert!(message.contains(&format!("split={split}")), "{message}");
+        }
+        // Defaults say nothing, given or filled in.
+        let resolved = structure::make(&Spec::parse(&format!("bvh:split={split}")).unwrap()).unwrap().1;
+        assert_eq!(structure::make(&resolved).unwrap().1, resolved);
+        assert!(structure::make(&Spec::parse(&format!("bvh:split={split},bins=16,stop=size")).unwrap()).is_ok());
+    }
+    assert!(structure::make(&Spec::parse("bvh:bins=32,stop=cost").unwrap()).is_ok());
 }
