@@ -139,6 +139,7 @@ pub struct Work {
 
 /// Carry of each lane: the wanted planes that it is not inside of. Without
 /// `per_plane`, all of them unless it is inside of all.
+#[inline]
 pub(super) fn planes_left(masks: &PlaneMasks, wanted: u8, per_plane: bool) -> [u8; LANES] {
     // Byte k holds the lanes inside plane k; transposed, byte l holds the planes of lane l.
     let rows = masks.inside.iter().rev().fold(0, |rows, m| rows << 8 | u64::from(*m));
