@@ -14,7 +14,7 @@ use rand_chacha::rand_core::{RngCore, SeedableRng};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     Reproduced,
-    /// Measured culling time alone does not show it, the modelled frame time does.
+    /// The claim is about modelled frame time, which shows it; measured culling time alone does not.
     ModelOnly,
     /// The interval holds both outcomes, or data are missing.
     Undecided,
@@ -156,16 +156,19 @@ pub fn decide(relation: Relation, published: Option<[f64; 2]>, tolerance: f64, (
     }
 }
 
-/// Measured and modelled verdicts to one: agreement of the model alone is said as such.
+/// Measured and modelled verdicts to one. The metric that the claim names decides: the model
+/// adds drawing, so that it can neither save nor fell a claim about culling alone; agreement
+/// of the model without that of the measurement is said as such.
 pub fn combine(claim_is_modelled: bool, measured: Option<Verdict>, model: Option<Verdict>) -> Verdict {
     use Verdict::{ModelOnly, Reproduced, Undecided};
+    if !claim_is_modelled {
+        return measured.unwrap_or(Undecided);
+    }
     match (measured, model) {
-        (Some(Reproduced), _) if !claim_is_modelled => Reproduced,
         (Some(Reproduced), Some(Reproduced)) => Reproduced,
         (_, Some(Reproduced)) => ModelOnly,
-        (_, Some(model)) if claim_is_modelled => model,
-        (Some(measured), _) => measured,
-        (None, Some(model)) => model,
+        (_, Some(model)) => model,
+        (Some(measured), None) => measured,
         (None, None) => Undecided,
     }
 }
