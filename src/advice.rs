@@ -241,11 +241,12 @@ fn reasons(question: &Question, considered: &[Considered], chosen: usize) -> Vec
     let us = |ns: f64| format!("{:.1} us", ns / 1e3);
     let Some(own) = &considered[chosen].timed else { return Vec::new() };
     let mut out = vec![format!(
-        "it culls a frame in {}, and submits {:.0} triangles of {} in {:.0} draw calls: {} as modelled",
+        "it culls a frame in {}, and submits {:.0} triangles of {} in {:.0} draw {}: {} as modelled",
         us(own.cull_ns),
         own.counts.entries,
         question.scene.len(),
         own.counts.draw_calls,
+        if own.counts.draw_calls.round() == 1.0 { "call" } else { "calls" },
         us(question.model.cull_scale * own.cull_ns + own.draw_ns),
     )];
     let rivals =
