@@ -4,8 +4,8 @@ use super::best;
 use super::metrics::{self, Kind, Metric};
 use super::own_value;
 use super::pairs::{Pairs, Trials, groups, trials};
-use crate::claim::{Claim, Relation};
-use crate::results::StudyResults;
+use crate::claim::{Claim, Relation, selects};
+use crate::results::{RunResult, StudyResults};
 use crate::stats;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
@@ -88,9 +88,27 @@ pub fn judge<'a>(results: &StudyResults, claim: &'a Claim) -> Judged<'a> {
             },
         });
     }
+    if let ([group], Some(place)) = (&mut out[..], only_place(results, claim)) {
+        group.name = place;
+    }
     let verdict = overall(&out);
     let summary = summary(verdict, &out);
     Judged { claim, verdict, summary, groups: out }
+}
+
+/// The scene of a claim that is not made scene by scene and speaks of one alone: then
+/// "everywhere" is there.
+fn only_place(results: &StudyResults, claim: &Claim) -> Option<String> {
+    if claim.for_each.is_some() || claim.relation == Relation::Grows || !claim.published_for.is_empty() {
+        return None;
+    }
+    let spoken = |r: &&RunResult| selects(&claim.numerator, &r.spec) || selects(&claim.denominator, &r.spec);
+    // A claim about a metric itself has no denominator.
+    let spoken = |r: &&RunResult| if claim.relation.is_own() { selects(&claim.numerator, &r.spec) } else { spoken(r) };
+    let mut runs = results.runs.iter().filter(spoken);
+    let first = runs.next()?;
+    let same = |r: &RunResult| r.scene() == first.scene() && r.spec.path.name == first.spec.path.name;
+    runs.all(same).then(|| super::labels::place(results, first))
 }
 
 fn twins(name: &str) -> (Option<&'static Metric>, Option<&'static Metric>) {
