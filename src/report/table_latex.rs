@@ -9,6 +9,8 @@ use std::fmt::Write;
 const WORDY: f64 = 16.0;
 /// No wrapped column gets narrower than this, in characters.
 const NARROW: f64 = 9.0;
+/// Text in a column as wide as this reads well.
+const FAIR: f64 = 24.0;
 /// Points between two columns (`2\tabcolsep`).
 const GAP_PT: f64 = 6.0;
 /// Mean width of a character, in em: of Computer Modern, rather too much.
@@ -29,6 +31,8 @@ const FLOAT: f64 = 0.75;
 /// Characters that a column takes: at least, so that no word is cut, and at best.
 struct Room {
     least: f64,
+    /// What is still good to read.
+    fair: f64,
     best: f64,
 }
 
@@ -175,7 +179,7 @@ fn breakable(latex: &str) -> String {
 
 /// Pieces of a text that do not break.
 fn pieces(text: &str) -> impl Iterator<Item = f64> + '_ {
-    text.split_inclusive([' ', ':', ',', '+', '_', '=', '/']).map(|p| p.trim_end().chars().count() as f64)
+    text.split_inclusive([' ', '-', ':', ',', '+', '_', '=', '/']).map(|p| p.trim_end().chars().count() as f64)
 }
 
 /// As [`cell`] breaks it.
@@ -199,7 +203,7 @@ fn room(table: &Table, c: usize) -> Room {
         false if whole <= WORDY => best,
         false => unbroken.max(NARROW),
     };
-    Room { least, best }
+    Room { least, fair: if column.numeric { least } else { FAIR }, best }
 }
 
 /// The largest type in which all fits, upright if it can be.
@@ -208,10 +212,9 @@ fn layout(rooms: &[Room]) -> Layout {
     let mut choices = [TEXT_PT.0, TEXT_PT.1].into_iter().enumerate().flat_map(|(t, w)| SIZES.map(|s| (t == 1, w, s)));
     let characters = |width: f64, pt: f64| (width - gaps) / (pt * CHARACTER_EM);
     let least: f64 = rooms.iter().map(|r| r.least).sum();
-    // Notes wrap, but not into a column of single words.
-    let fair: f64 = rooms.iter().map(|r| r.least.max(r.best.min(22.0))).sum();
-    let found = choices.clone().find(|(_, w, (_, pt))| fair <= characters(*w, *pt));
-    let found = found.or_else(|| choices.find(|(_, w, (_, pt))| least <= characters(*w, *pt)));
+    // Notes wrap, but not into a column of single words: rather in smaller type.
+    let fair: f64 = rooms.iter().map(|r| r.least.max(r.best.min(r.fair))).sum();
+    let found = choices.find(|(_, w, (_, pt))| fair <= characters(*w, *pt));
     let (turned, width, (size, em_pt)) = found.unwrap_or((true, TEXT_PT.1, SIZES[3]));
     let free = (characters(width, em_pt) - least).max(0.0);
     // What is left goes to whoever lacks most.
