@@ -288,11 +288,12 @@ fn reasons(question: &Question, considered: &[Considered], chosen: usize) -> Vec
         Objective::Cull => String::new(),
     };
     let mut out = vec![format!(
-        "it culls a frame in {}, and submits {:.0} triangles of {} in {:.0} draw calls{modelled}",
+        "it culls a frame in {}, and submits {:.0} triangles of {} in {:.0} draw {}{modelled}",
         us(own.cull_ns),
         own.counts.entries,
         question.scene.len(),
         own.counts.draw_calls,
+        if own.counts.draw_calls.round() == 1.0 { "call" } else { "calls" },
     )];
     let rivals =
         considered.iter().enumerate().filter(|(i, _)| *i != chosen).filter_map(|(_, c)| Some((c, c.timed.as_ref()?)));

@@ -86,6 +86,15 @@ pub fn median_ci(values: &[f64]) -> (f64, f64) {
     (at(0.025), at(0.975))
 }
 
+/// Up to so many values [`median_ci`] reaches from the smallest to the largest.
+pub const ENDS: usize = 5;
+
+/// How often the interval from the smallest to the largest of `n` values holds the true
+/// median, whatever the distribution: unless all of them fall on the same side of it.
+pub fn coverage_of_ends(n: usize) -> f64 {
+    1.0 - 0.5f64.powi(n as i32 - 1)
+}
+
 /// P(at least `k` of `n` draws fall among the first `i` of `n` values).
 fn at_least(k: usize, i: usize, n: usize, ln_factorial: &[f64]) -> f64 {
     if i == 0 || i == n {
@@ -299,6 +308,19 @@ mod tests {
         }
         assert_eq!(median_ci(&[f64::INFINITY; 3]), (f64::INFINITY, f64::INFINITY));
         assert_eq!(median_ci(&[4.0]), (4.0, 4.0));
+    }
+
+    #[test]
+    fn few_values_are_spanned_by_their_interval_and_cover_what_is_said() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        for n in 2..=ENDS {
+            let drawn = (0..20_000).map(|_| (0..n).map(|_| f64::from(rng.next_u32())).collect::<Vec<f64>>());
+            let intervals = drawn.map(|v| (median_ci(&v), (quantile(&v, 0.0), quantile(&v, 1.0))));
+            let middle = f64::from(u32::MAX) / 2.0;
+            let covered = intervals.inspect(|(a, b)| assert_eq!(a, b)).filter(|(i, _)| i.0 <= middle && middle <= i.1);
+            assert!((covered.count() as f64 / 2e4 - coverage_of_ends(n)).abs() < 0.015, "{n}");
+        }
+        assert!(median_ci(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).0 > 1.0 && coverage_of_ends(3) == 0.75);
     }
 
     #[test]

@@ -16,6 +16,7 @@ pub mod export;
 pub mod frontier;
 pub mod import;
 pub mod inspect;
+pub mod parts;
 pub mod path;
 mod pipe;
 pub mod plan;
@@ -52,6 +53,8 @@ pub enum Verb {
     Run(run::Args),
     /// Check a manifest: every mistake with line, column and a suggestion
     Check(check::Args),
+    /// What a manifest can name: structures, tests, walks, generators and all their parameters
+    Parts(parts::Args),
     /// Show the matrix of a manifest without running it
     Plan(plan::Args),
     /// Write the report of a stored study
@@ -119,6 +122,7 @@ pub fn main() -> ExitCode {
     let result = match cli.verb {
         Verb::Run(a) => run::run(a),
         Verb::Check(a) => check::run(a),
+        Verb::Parts(a) => parts::run(a),
         Verb::Plan(a) => plan::run(a),
         Verb::Report(a) => report::run(a),
         Verb::Query(a) => query::run(a),

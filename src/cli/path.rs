@@ -3,6 +3,7 @@
 use super::scene::{SceneOptions, path_file_spec, spec_of};
 use crate::record::{PathSource, PathSpec};
 use crate::registry::{Spec, Value};
+use crate::report::format::count;
 use crate::scene::placement::Placement;
 use crate::scene::walkthrough::{self, csv, generate};
 use crate::scene::{load, winding};
@@ -79,7 +80,8 @@ fn generate(a: &GenerateArgs) -> anyhow::Result<ExitCode> {
     let frame = |(n, p)| csv::Frame { number: n, pose: placement.pose_to_file(p) };
     let frames: Vec<csv::Frame> = (0u64..).zip(&poses).map(frame).collect();
     csv::write(&a.out, &frames)?;
-    println!("{}: {} frames of {walk} through {}", a.out.display(), frames.len(), scene_spec.name);
+    let n = count(frames.len() as u64, "frame", "frames");
+    println!("{}: {n} of {walk} through {}", a.out.display(), scene_spec.name);
     Ok(ExitCode::SUCCESS)
 }
 

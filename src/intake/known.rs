@@ -65,7 +65,8 @@ fn state(k: &KnownRun, run: &RunSpec, earlier: Option<&RunSpec>, policy: &Repeat
 }
 
 fn grid(a: &Accuracy) -> String {
-    format!("{} frames of {} x {} px", a.frames, a.width_px, a.height_px)
+    let s = if a.frames == 1 { "" } else { "s" };
+    format!("{} frame{s} of {} x {} px", a.frames, a.width_px, a.height_px)
 }
 
 /// Every part of an id in which two runs of one name differ.

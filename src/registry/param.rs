@@ -64,6 +64,18 @@ impl Default {
         }
     }
 
+    /// Parameters, and what they must be for this one to have an effect.
+    pub fn conditions(&self) -> Vec<(&'static str, &'static [&'static str])> {
+        let (mut out, mut default) = (Vec::new(), self);
+        while let Default::Later(of) | Default::Only { of, .. } = default {
+            if let Default::Only { with, is, .. } = default {
+                out.push((*with, *is));
+            }
+            default = of;
+        }
+        out
+    }
+
     /// Whether the default stays unnamed.
     pub fn is_later(&self) -> bool {
         match self {
@@ -79,25 +91,21 @@ impl Param {
     /// When `spec` gives it a value that the other parameters leave without effect.
     pub(super) fn is_asked_for(&self, spec: &Spec, params: &[Param]) -> Result<()> {
         let Some(value) = spec.params.get(self.name).filter(|v| **v != self.default.value()) else { return Ok(()) };
-        let mut default = &self.default;
-        while let Default::Later(of) | Default::Only { of, .. } = default {
-            if let Default::Only { with, is, .. } = default {
-                let other = params.iter().find(|p| p.name == *with).expect("a condition names a parameter");
-                let stated = spec.params.get(*with).cloned();
-                // What an axis will say is not known yet.
-                let unknown = stated.is_none() && matches!(other.default.plain(), Default::Axis(_));
-                let stated = stated.unwrap_or_else(|| other.default.value()).to_string();
-                if !unknown && !is.contains(&stated.as_str()) {
-                    let list = is.iter().map(|c| format!("`{with}={c}`")).collect::<Vec<_>>().join(" or ");
-                    return Err(Error::new(format!("is {value}, which has no effect with `{with}={stated}`"))
-                        .key(self.name)
-                        .help(format!(
-                            "leave `{}` out there, or take {list}; where `{with}` is a list, give `{stated}` an entry of its own",
-                            self.name
-                        )));
-                }
+        for (with, is) in self.default.conditions() {
+            let other = params.iter().find(|p| p.name == with).expect("a condition names a parameter");
+            let stated = spec.params.get(with).cloned();
+            // What an axis will say is not known yet.
+            let unknown = stated.is_none() && matches!(other.default.plain(), Default::Axis(_));
+            let stated = stated.unwrap_or_else(|| other.default.value()).to_string();
+            if !unknown && !is.contains(&stated.as_str()) {
+                let list = is.iter().map(|c| format!("`{with}={c}`")).collect::<Vec<_>>().join(" or ");
+                return Err(Error::new(format!("is {value}, which has no effect with `{with}={stated}`"))
+                    .key(self.name)
+                    .help(format!(
+                        "leave `{}` out there, or take {list}; where `{with}` is a list, give `{stated}` an entry of its own",
+                        self.name
+                    )));
             }
-            default = of;
         }
         Ok(())
     }

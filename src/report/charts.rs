@@ -12,6 +12,8 @@ use super::rows::{self, Datum, Rows};
 use super::scatter::{self, Scatter};
 use super::style::IDLE;
 use crate::results::{RunResult, RunStatus};
+use crate::stats;
+use std::collections::BTreeSet;
 
 pub fn all(grid: &Grid, judged: &[Judged]) -> Vec<Figure> {
     if grid.results.runs.is_empty() {
@@ -52,6 +54,20 @@ fn dot(metric: &'static str) -> impl Fn(&RunResult) -> Option<Datum> {
 }
 
 const WHISKERS: &str = "Dots: median over repeats; whiskers: its 95 % bootstrap interval.";
+
+/// What the intervals of few trials are worth: less than the 95 % that the resamples say.
+pub fn coverage(grid: &Grid) -> Option<String> {
+    let done = grid.runs().filter(|r| r.status == RunStatus::Done).map(|r| r.trials.len());
+    let few: BTreeSet<usize> = done.filter(|n| (2..=stats::ENDS).contains(n)).collect();
+    let (first, rest) = (few.first()?, few.iter().skip(1));
+    let percent = |n: &usize| format!("{} %", format::number(100.0 * stats::coverage_of_ends(*n), 3));
+    let rest: String = rest.map(|n| format!(", of {n} with {}", percent(n))).collect();
+    Some(format!(
+        "With so few repeats the intervals of medians reach from the smallest to the largest: those of {first} hold the true \
+         median with a probability of {}{rest}, not 95 %.",
+        percent(first)
+    ))
+}
 
 /// Explains the daggers, where there are any.
 fn dagger(grid: &Grid) -> &'static str {
@@ -173,7 +189,8 @@ fn errors(grid: &Grid) -> Vec<Figure> {
     let samples = format!("Errors at {} of each path.", count(judged as u64, "judged frame", "judged frames"));
     let front = format!(
         "Joined: the points that no other beats in both; hollow: behind them by less than the 95 % intervals (horizontal \
-         bars) can tell; faded: dominated beyond the intervals.{}",
+         bars) can tell; faded: dominated beyond the intervals. Of each front a few points are named, its ends first; the \
+         table names all.{}",
         dagger(grid)
     );
     let zero = "The bin below the break holds exact zeros; height says nothing in it.";

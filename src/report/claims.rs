@@ -4,8 +4,8 @@ use super::best;
 use super::metrics::{self, Kind, Metric};
 use super::own_value;
 use super::pairs::{Pairs, Trials, groups, trials};
-use crate::claim::{Claim, Relation};
-use crate::results::StudyResults;
+use crate::claim::{Claim, Relation, selects};
+use crate::results::{RunResult, StudyResults};
 use crate::stats;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
@@ -14,7 +14,7 @@ use rand_chacha::rand_core::{RngCore, SeedableRng};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     Reproduced,
-    /// Measured culling time alone does not show it, the modelled frame time does.
+    /// The claim is about modelled frame time, which shows it; measured culling time alone does not.
     ModelOnly,
     /// The interval holds both outcomes, or data are missing.
     Undecided,
@@ -88,9 +88,27 @@ pub fn judge<'a>(results: &StudyResults, claim: &'a Claim) -> Judged<'a> {
             },
         });
     }
+    if let ([group], Some(place)) = (&mut out[..], only_place(results, claim)) {
+        group.name = place;
+    }
     let verdict = overall(&out);
     let summary = summary(verdict, &out);
     Judged { claim, verdict, summary, groups: out }
+}
+
+/// The scene of a claim that is not made scene by scene and speaks of one alone: then
+/// "everywhere" is there.
+fn only_place(results: &StudyResults, claim: &Claim) -> Option<String> {
+    if claim.for_each.is_some() || claim.relation == Relation::Grows || !claim.published_for.is_empty() {
+        return None;
+    }
+    let spoken = |r: &&RunResult| selects(&claim.numerator, &r.spec) || selects(&claim.denominator, &r.spec);
+    // A claim about a metric itself has no denominator.
+    let spoken = |r: &&RunResult| if claim.relation.is_own() { selects(&claim.numerator, &r.spec) } else { spoken(r) };
+    let mut runs = results.runs.iter().filter(spoken);
+    let first = runs.next()?;
+    let same = |r: &RunResult| r.scene() == first.scene() && r.spec.path.name == first.spec.path.name;
+    runs.all(same).then(|| super::labels::place(results, first))
 }
 
 fn twins(name: &str) -> (Option<&'static Metric>, Option<&'static Metric>) {
@@ -156,16 +174,19 @@ pub fn decide(relation: Relation, published: Option<[f64; 2]>, tolerance: f64, (
     }
 }
 
-/// Measured and modelled verdicts to one: agreement of the model alone is said as such.
+/// Measured and modelled verdicts to one. The metric that the claim names decides: the model
+/// adds drawing, so that it can neither save nor fell a claim about culling alone; agreement
+/// of the model without that of the measurement is said as such.
 pub fn combine(claim_is_modelled: bool, measured: Option<Verdict>, model: Option<Verdict>) -> Verdict {
     use Verdict::{ModelOnly, Reproduced, Undecided};
+    if !claim_is_modelled {
+        return measured.unwrap_or(Undecided);
+    }
     match (measured, model) {
-        (Some(Reproduced), _) if !claim_is_modelled => Reproduced,
         (Some(Reproduced), Some(Reproduced)) => Reproduced,
         (_, Some(Reproduced)) => ModelOnly,
-        (_, Some(model)) if claim_is_modelled => model,
-        (Some(measured), _) => measured,
-        (None, Some(model)) => model,
+        (_, Some(model)) => model,
+        (Some(measured), None) => measured,
         (None, None) => Undecided,
     }
 }

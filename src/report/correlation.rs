@@ -104,7 +104,7 @@ fn panel(figure: &mut Figure, cloud: &Cloud, plot: Rect, leftmost: bool) {
     let x = axis(cloud.points.iter().map(|p| p.0)).onto(plot.x, plot.right());
     let y = axis(cloud.points.iter().map(|p| p.1)).onto(plot.bottom(), plot.y);
     facets::y_axis(figure, plot, &y, 5);
-    facets::x_axis(figure, plot, &x, (plot.w / 60.0) as usize, true);
+    facets::x_axis(figure, plot, &x, (plot.w / 60.0) as usize);
     facets::x_title(figure, plot, "triangles submitted");
     if leftmost {
         facets::y_title(figure, plot, "culling time (µs)", 50.0);

@@ -80,6 +80,7 @@ pub fn draw(grid: &Grid, what: &Curves) -> Figure {
         })
         .collect();
 
+    let log = log(grid, &curves);
     let layout = layout(grid, &chosen);
     let mut figure = Figure::new(what.id, what.title, WIDTH, layout.height);
     facets::title(&mut figure, what.title, what.sub);
@@ -91,7 +92,9 @@ pub fn draw(grid: &Grid, what: &Curves) -> Figure {
             row_head(&mut figure, grid, panel);
         }
         let lowest = !layout.by_structure || row + 1 == rows;
-        draw_panel(&mut figure, grid, what, &layout, &chosen, panel, &curves[panel.place], (column == 0, lowest));
+        // One y axis for all structures of a scene.
+        let y = Scale::of(log, extent(&curves[panel.place])).onto(panel.plot.bottom(), panel.plot.y);
+        draw_panel(&mut figure, grid, what, &layout, &chosen, panel, &curves[panel.place], y, (column == 0, lowest));
     }
     figure.description = describe(grid, &curves, what);
     figure
@@ -199,12 +202,11 @@ fn draw_panel(
     chosen: &Chosen,
     panel: &Panel,
     curves: &[Line],
+    y: Scale,
     (leftmost, lowest): (bool, bool),
 ) {
     let plot = panel.plot;
     figure.part(Part::Plot, plot);
-    // One y axis for all structures of a scene.
-    let y = y_scale(grid, panel.place, curves).onto(plot.bottom(), plot.y);
     let last = grid.cells[panel.place].iter().flatten().map(|r| frames(r)).max().unwrap_or(1);
     let x = Scale { high: last.max(1) as f64, ..Scale::from_zero([1.0]) }.onto(plot.x, plot.right());
     if layout.by_structure {
@@ -219,7 +221,7 @@ fn draw_panel(
         facets::y_grid(figure, plot, &y, 5);
     }
     // The label at the right end would run into that of the next panel's zero.
-    facets::x_axis(figure, plot, &x, (plot.w / 60.0) as usize, true);
+    facets::x_axis(figure, plot, &x, (plot.w / 60.0) as usize);
     if lowest {
         facets::x_title(figure, plot, "frame");
     }
@@ -249,13 +251,19 @@ fn draw_panel(
     }
 }
 
-/// Linear from zero unless the combinations that cull range widely: those that
+fn extent(curves: &[Line]) -> Vec<f64> {
+    curves.iter().flatten().flat_map(|p| [p.low, p.high]).collect()
+}
+
+/// Linear from zero unless the combinations that cull range widely in some scene: those that
 /// cull nothing cost next to nothing and must not squeeze all others.
-fn y_scale(grid: &Grid, place: usize, curves: &[Line]) -> Scale {
-    let all: Vec<f64> = curves.iter().flatten().flat_map(|p| [p.low, p.high]).collect();
-    let culls = |c: &usize| grid.cells[place][*c].is_some_and(|r| r.culling != IDLE);
-    let working: Vec<f64> = (0..curves.len()).filter(culls).flat_map(|c| curves[c].iter().map(|p| p.middle)).collect();
-    if Scale::fitting(&working).is_log() { Scale::fitting(&all) } else { Scale::from_zero(all) }
+fn log(grid: &Grid, curves: &[Vec<Line>]) -> bool {
+    let working = |place: usize| -> Vec<f64> {
+        let culls = |c: &usize| grid.cells[place][*c].is_some_and(|r| r.culling != IDLE);
+        (0..curves[place].len()).filter(culls).flat_map(|c| curves[place][c].iter().map(|p| p.middle)).collect()
+    };
+    let positive = curves.iter().flatten().flatten().all(|p| p.low > 0.0);
+    positive && Scale::common_log(&(0..curves.len()).map(working).collect::<Vec<_>>())
 }
 
 /// "octree × frustum failed, ...": runs of the matrix that have no line, with the reason in a word.

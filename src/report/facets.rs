@@ -140,10 +140,10 @@ pub fn panel_head(figure: &mut Figure, plot: Rect, text: &str, note: &str) {
     }
 }
 
-/// Vertical grid lines and labels below: an x axis. Labels that would touch are left out.
-pub fn x_axis(figure: &mut Figure, plot: Rect, scale: &Scale, wanted: usize, labels: bool) {
-    let mut free_from = f64::NEG_INFINITY;
-    for tick in scale.ticks(wanted) {
+/// Vertical grid lines and labels below: an x axis.
+pub fn x_axis(figure: &mut Figure, plot: Rect, scale: &Scale, wanted: usize) {
+    let width = |text: &str| font::width(text, SMALL, false);
+    for tick in scale.ticks(wanted, &width) {
         let x = scale.at(tick.at);
         if tick.label.is_empty() {
             figure.segment((x, plot.bottom()), (x, plot.bottom() - 3.0), FRAME, 0.8);
@@ -152,30 +152,29 @@ pub fn x_axis(figure: &mut Figure, plot: Rect, scale: &Scale, wanted: usize, lab
         figure.segment((x, plot.y), (x, plot.bottom()), GRID, 1.0);
         figure.segment((x, plot.bottom()), (x, plot.bottom() + 4.0), FRAME, 1.0);
         // A label at the right end stays within its panel: the next one begins there.
-        let middle = plain(SMALL, MUTED).middle();
-        let over = text_box(x, 0.0, &tick.label, middle).right() > plot.right() + 6.0;
-        let style = if over { plain(SMALL, MUTED).end() } else { middle };
-        let x = if over { plot.right() } else { x };
-        let r = text_box(x, plot.bottom() + 15.0, &tick.label, style);
-        if labels && r.x > free_from {
-            figure.label(x, plot.bottom() + 15.0, &tick.label, style);
-            free_from = r.right() + 6.0;
-        }
+        let middle = scale.kept(x, width(&tick.label) / 2.0);
+        figure.label(middle, plot.bottom() + 15.0, &tick.label, plain(SMALL, MUTED).middle());
     }
     figure.segment((plot.x, plot.bottom()), (plot.right(), plot.bottom()), FRAME, 1.0);
+}
+
+/// What a label takes along an upright axis.
+fn line_height(_: &str) -> f64 {
+    0.96 * SMALL
 }
 
 /// Horizontal grid lines and labels at the left: a y axis.
 pub fn y_axis(figure: &mut Figure, plot: Rect, scale: &Scale, wanted: usize) {
     y_grid(figure, plot, scale, wanted);
-    for tick in scale.ticks(wanted).iter().filter(|t| !t.label.is_empty()) {
-        figure.label(plot.x - 7.0, scale.at(tick.at) + 3.6, &tick.label, plain(SMALL, MUTED).end());
+    for tick in scale.ticks(wanted, &line_height).iter().filter(|t| !t.label.is_empty()) {
+        let y = scale.kept(scale.at(tick.at), line_height(&tick.label) / 2.0);
+        figure.label(plot.x - 7.0, y + 3.6, &tick.label, plain(SMALL, MUTED).end());
     }
 }
 
 /// A y axis that shares the labels of the panel to its left.
 pub fn y_grid(figure: &mut Figure, plot: Rect, scale: &Scale, wanted: usize) {
-    for tick in scale.ticks(wanted) {
+    for tick in scale.ticks(wanted, &line_height) {
         let y = scale.at(tick.at);
         if tick.label.is_empty() {
             figure.segment((plot.x, y), (plot.x + 3.0, y), FRAME, 0.8);

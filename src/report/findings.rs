@@ -68,6 +68,12 @@ fn bracket((r, low, high): Ratio) -> String {
     format!("{} [{}, {}]", format::ratio(r), format::number(low, 3), format::number(high, 3))
 }
 
+/// "1.05 × faster", "1.02 × slower": the number is never below 1, the word says which way.
+fn change(faster: f64) -> String {
+    let (ratio, word) = if faster < 1.0 { (1.0 / faster, "slower") } else { (faster, "faster") };
+    if ratio < 1.005 { "as fast".into() } else { format!("{} {word}", format::ratio(ratio)) }
+}
+
 /// Who wins where: scenes with the same winner share a sentence.
 fn shortest(grid: &Grid) -> Vec<String> {
     let mut winners: Vec<(usize, Vec<String>)> = Vec::new();
@@ -191,9 +197,10 @@ fn addition(grid: &Grid, term: &str, without: &str, pairs: &[(usize, &RunResult,
         let mut order: Vec<usize> = (0..values.len()).collect();
         order.sort_by(|a, b| single(*a).total_cmp(&single(*b)));
         let (least, most) = (order[0], order[order.len() - 1]);
-        let at = |i: usize| {
-            format!("{} on {} in {}", format::ratio(single(i)), grid.places[timed[i].0], timed[i].2.structure)
-        };
+        // Away from the mean's side: what is slower is told from the least slow on.
+        let (least, most) = if r < 1.0 { (most, least) } else { (least, most) };
+        // Each with its own word: pairs may differ in direction from their mean.
+        let at = |i: usize| format!("{} on {} in {}", change(single(i)), grid.places[timed[i].0], timed[i].2.structure);
         text += &format!(" (geometric mean of {} pairs, from {} to {})", values.len(), at(least), at(most));
     }
     let share = |name: &str| {
@@ -328,4 +335,18 @@ pub fn best_table(grid: &Grid) -> Table {
                      over trials. “Modelled” is derived, not measured."
             .into();
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_has_a_number_above_one_and_a_word_for_its_direction() {
+        let plain = |x: f64| change(x).replace('\u{A0}', " ");
+        assert_eq!(plain(1.25), "1.25 × faster");
+        assert_eq!(plain(0.956), "1.05 × slower");
+        assert_eq!(plain(0.974), "1.03 × slower");
+        assert_eq!((plain(1.0).as_str(), plain(0.997).as_str()), ("as fast", "as fast"));
+    }
 }

@@ -49,6 +49,7 @@ pub mod sweep_chart;
 pub mod sweep_tables;
 pub mod sweeps;
 pub mod table;
+mod table_latex;
 pub mod tables;
 
 use crate::claim::Claim;

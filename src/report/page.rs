@@ -78,7 +78,11 @@ pub fn document(content: &Content) -> String {
     }
     let time = ["total-time-modelled", "total-time", "time-per-frame", "triangles-per-frame"];
     out += &section("times-section", "Time and work", &(figures(content, &time) + &table(content, "times")));
-    out += &section("rates-section", "Frames per second, and time against triangles", &rates_html(content));
+    out += &section(
+        "rates-section",
+        &format!("{}, and time against triangles", rates::title(content.grid)),
+        &rates_html(content),
+    );
     let front = ["time-against-error-modelled", "time-against-error", "time-against-over-submission"];
     let body = figures(content, &front);
     if !body.is_empty() {
@@ -147,7 +151,7 @@ fn header(content: &Content) -> String {
     }
     links.extend([
         ("times-section", "Time and work"),
-        ("rates-section", "Frames per second"),
+        ("rates-section", rates::title(content.grid)),
         ("frontier-section", "Time against error"),
     ]);
     if !content.grid.results.advice.is_empty() {
@@ -207,7 +211,7 @@ fn sweeps_html(content: &Content) -> String {
 }
 
 fn rates_html(content: &Content) -> String {
-    let mut out = format!("<p>{}</p>\n{}", html(rates::WORDS), table(content, "rates-best"));
+    let mut out = format!("<p>{}</p>\n{}", html(&rates::words(content.grid)), table(content, "rates-best"));
     out += &figures(content, &["triangles-against-time"]);
     let all = table(content, "rates");
     if !all.is_empty() {
@@ -234,9 +238,6 @@ fn again_html(content: &Content, again: &Repeatability) -> String {
     out
 }
 
-/// Below this a bootstrap over trials has too few values to draw from.
-const FEW_TRIALS: usize = 5;
-
 fn findings_html(content: &Content) -> String {
     let mut out = String::from("<ul class=\"findings\">\n");
     for finding in findings(content.grid, content.judged) {
@@ -244,14 +245,8 @@ fn findings_html(content: &Content) -> String {
     }
     out += "</ul>\n<p class=\"note\">Computed from the data below. Brackets: 95 % bootstrap interval over repeats. \
             “Modelled” times are derived, not measured; † may lose visible triangles by design.";
-    let done = content.grid.results.runs.iter().filter(|r| r.status == RunStatus::Done);
-    let fewest = done.map(|r| r.trials.len()).min().unwrap_or(0);
-    if (1..FEW_TRIALS).contains(&fewest) {
-        let _ = write!(
-            out,
-            " With {} a run the intervals span little more than what was seen: they say less than they seem to.",
-            super::format::count(fewest as u64, "repeat", "repeats")
-        );
+    if let Some(words) = charts::coverage(content.grid) {
+        let _ = write!(out, " {}", html(&words));
     }
     out + "</p>\n" + &table(content, "best")
 }
@@ -324,7 +319,8 @@ fn methods(content: &Content) -> String {
     paragraph(
         "A trial is one repeat: a child process of its own that loads the scene, builds the structure, warms up and walks \
          the path. The trials of a scene are interleaved by a recorded shuffle. The bootstrap resamples trials, never \
-         frames: frames of one walk depend on each other.",
+         frames: frames of one walk depend on each other. Of medians its interval is computed over all resamples, of ratios \
+         drawn from 10,000 of them, with a fixed seed.",
     );
     for protocol in protocols(grid) {
         paragraph(&protocol);

@@ -22,6 +22,8 @@ pub const DEFAULT_COLUMNS: &[&str] = &[
     "scene",
     "structure",
     "culling",
+    // Rows of two walks would look the same.
+    "walk",
     "status",
     "total_cull_ms",
     "p99_frame_us",

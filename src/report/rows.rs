@@ -82,7 +82,7 @@ pub fn draw(grid: &Grid, what: &Rows) -> Figure {
     let fitting = (((WIDTH - left - 24.0) / 172.0) as usize).clamp(1, 4);
     let rows = n.div_ceil(fitting);
     let columns = n.div_ceil(rows);
-    let gap = (22.0, 62.0);
+    let gap = (22.0, 72.0);
     let w = ((WIDTH - left - 24.0 - gap.0 * (columns as f64 - 1.0)) / columns as f64).clamp(120.0, 420.0);
     let h = ROW * grid.combinations.len() as f64 + 6.0;
     let width = left + w * columns as f64 + gap.0 * (columns as f64 - 1.0) + 24.0;
@@ -96,11 +96,8 @@ pub fn draw(grid: &Grid, what: &Rows) -> Figure {
         let scale = scale.onto(plot.x, plot.right());
         figure.part(Part::Plot, plot);
         facets::panel_head(&mut figure, plot, &grid.places[i], "");
-        facets::x_axis(&mut figure, plot, &scale, (w / 55.0) as usize, true);
-        let lowest = i + columns >= grid.places.len();
-        if lowest {
-            facets::x_title(&mut figure, plot, what.axis);
-        }
+        facets::x_axis(&mut figure, plot, &scale, (w / 55.0) as usize);
+        facets::x_title(&mut figure, plot, what.axis);
         for (c, label) in grid.combinations.iter().enumerate() {
             let y = plot.y + 3.0 + ROW * (c as f64 + 0.5);
             if i % columns == 0 {

@@ -11,7 +11,7 @@ use super::labels::Grid;
 use super::metrics::Metric;
 use super::rows;
 use super::scale::{BREAK, Kind, Scale};
-use super::style::{ALARM, FRAME, INK, Look, MUTED, SHADE, Shape};
+use super::style::{ALARM, INK, Legend, Look, MUTED, SHADE, Shape};
 use std::collections::BTreeSet;
 
 pub struct Scatter<'a> {
@@ -40,16 +40,19 @@ pub fn draw(grid: &Grid, what: &Scatter) -> Figure {
     let (left, gap) = (74.0, (84.0, 78.0));
     let width = left + columns as f64 * w + (columns as f64 - 1.0) * gap.0 + 28.0;
     let inner = width - 32.0;
-    // Where looks repeat a legend of all would name nobody.
+    // A legend of very many combinations names nobody: there a marker is a kind of structure.
     let many = grid.legend.overflows();
     let leading: BTreeSet<usize> = all.iter().flat_map(|f| f.on_front().map(|p| p.combination)).collect();
-    let keep: Vec<usize> = leading.into_iter().collect();
-    let legend = if many { grid.legend.few(&keep) } else { grid.legend.clone() };
-    let look = |c: usize| match keep.iter().position(|k| *k == c) {
+    let keep: Vec<usize> = leading.iter().copied().collect();
+    let legend = if many { grid.legend.families(&keep) } else { grid.legend.clone() };
+    let look = |c: usize| match leading.contains(&c) {
         _ if !many => grid.legend.entries[c].look,
-        Some(i) => legend.entries[i].look,
-        None => Look { colour: MUTED, shape: Shape::Circle, dash: &[] },
+        true => legend.look(Legend::family(&grid.combinations[c])),
+        false => Look { colour: MUTED, shape: Shape::Circle, dash: &[] },
     };
+    let xs = all.iter().map(|f| f.points.iter().flat_map(|p| [p.x.0, p.x.1, p.x.2]).collect()).collect::<Vec<_>>();
+    let ys = all.iter().map(|f| heights(what, f)).collect::<Vec<_>>();
+    let log = (Scale::common_log(&xs), Scale::common_log(&ys));
     let top = 58.0 + facets::legend_height(&legend, inner, Sample::Marker) + 18.0 + 26.0;
     let height = top + rows as f64 * h + (rows as f64 - 1.0) * gap.1 + 46.0;
     let mut figure = Figure::new(what.id, what.title, width, height);
@@ -59,12 +62,13 @@ pub fn draw(grid: &Grid, what: &Scatter) -> Figure {
     let mut words = format!("{}. {} against {}. ", what.title, what.y_axis, what.x_axis);
     for (front, plot) in all.iter().zip(facets::panels(all.len(), columns, left, top, (w, h), gap)) {
         figure.part(Part::Plot, plot);
-        panel(&mut figure, grid, what, front, plot, &look);
+        panel(&mut figure, grid, what, front, plot, log, &look);
         let names: Vec<&str> = front.on_front().map(|p| grid.combinations[p.combination].as_str()).collect();
         words += &format!("{}: on the front {}. ", front.place, names.join(", "));
     }
     if many {
-        figure.label(16.0 + inner, top - 34.0, "grey: not on the front of any scene", plain(SMALL, MUTED).end());
+        let words = "marker: kind of structure; grey: not on the front of any scene";
+        figure.label(16.0 + inner, top - 34.0, words, plain(SMALL, MUTED).end());
     }
     figure.description = words.trim_end().to_string();
     figure
@@ -101,14 +105,27 @@ fn at_least(what: &Scatter, p: &Point) -> Option<f64> {
     if what.y.name == "over_submission" { over_submission(p.run)?.0 } else { None }
 }
 
-fn panel(figure: &mut Figure, grid: &Grid, what: &Scatter, front: &Front, plot: Rect, look: &dyn Fn(usize) -> Look) {
+/// What the y axis has to hold.
+fn heights(what: &Scatter, front: &Front) -> Vec<f64> {
+    front.points.iter().flat_map(|p| [Some(p.y.0), at_least(what, p)]).flatten().collect()
+}
+
+fn panel(
+    figure: &mut Figure,
+    grid: &Grid,
+    what: &Scatter,
+    front: &Front,
+    plot: Rect,
+    log: (bool, bool),
+    look: &dyn Fn(usize) -> Look,
+) {
     let ys: Vec<f64> = front.points.iter().map(|p| p.y.0).collect();
     let zeros = ys.iter().filter(|y| **y <= 0.0).count();
     facets::panel_head(figure, plot, &front.place, &notes(what, front, zeros));
 
     let xs: Vec<f64> = front.points.iter().flat_map(|p| [p.x.0, p.x.1, p.x.2]).collect();
     // Air at both ends, or markers and labels would leave the panel.
-    let x = Scale::fitting(&xs);
+    let x = Scale::of(log.0, xs);
     let inset = if x.is_log() { 14.0 } else { 0.0 };
     let x = x.onto(plot.x + inset, plot.right() - 14.0);
     let all_zero = what.zero_bin && zeros == ys.len();
@@ -123,8 +140,7 @@ fn panel(figure: &mut Figure, grid: &Grid, what: &Scatter, front: &Front, plot: 
         y.kind = Kind::LogZero(bin);
         y
     } else {
-        let low: Vec<f64> = front.points.iter().filter_map(|p| at_least(what, p)).collect();
-        Scale::fitting(&[&ys[..], &low].concat()).onto(plot.bottom(), plot.y + 8.0)
+        Scale::of(log.1, heights(what, front)).onto(plot.bottom(), plot.y + 8.0)
     };
     if !all_zero {
         facets::y_axis(figure, plot, &y, 4);
@@ -132,7 +148,7 @@ fn panel(figure: &mut Figure, grid: &Grid, what: &Scatter, front: &Front, plot: 
     if let Kind::LogZero(bin) = y.kind {
         zero_bin(figure, plot, bin - BREAK, all_zero);
     }
-    facets::x_axis(figure, plot, &x, 6, true);
+    facets::x_axis(figure, plot, &x, 6);
     facets::x_title(figure, plot, what.x_axis);
     facets::y_title(figure, plot, what.y_axis, 50.0);
 
@@ -241,9 +257,31 @@ fn staircase(front: &[(f64, f64)], plot: Rect) -> Vec<(f64, f64)> {
     line
 }
 
-/// Names of the dots on the front, clear of dots, of the front's line and of
-/// each other, with the price of those that may lose triangles. The legend
-/// names everything else.
+/// So many points of a front are named: more would lie on each other or far from their points.
+const NAMES: usize = 6;
+
+/// The ends of the front, then whoever lies farthest from those that came before.
+fn in_turn<'a, 'b>(dots: &'b [Dot<'a>]) -> Vec<&'b Dot<'a>> {
+    let mut rest: Vec<&Dot> = dots.iter().filter(|d| d.point.standing.on_front()).collect();
+    rest.sort_by(|a, b| a.at.0.total_cmp(&b.at.0).then(a.point.combination.cmp(&b.point.combination)));
+    let mut out: Vec<&Dot> = Vec::new();
+    if let Some(last) = rest.pop() {
+        out.extend((!rest.is_empty()).then(|| rest.remove(0)));
+        out.push(last);
+    }
+    while !rest.is_empty() {
+        let apart = |d: &Dot| {
+            let to = |o: &&Dot| (o.at.0 - d.at.0).hypot(o.at.1 - d.at.1);
+            out.iter().map(to).fold(f64::INFINITY, f64::min)
+        };
+        let farthest = (0..rest.len()).max_by(|a, b| apart(rest[*a]).total_cmp(&apart(rest[*b]))).unwrap_or(0);
+        out.push(rest.remove(farthest));
+    }
+    out
+}
+
+/// Names of a few dots on the front, clear of dots, of the front's line and of each other,
+/// with the price of those that may lose triangles; of others of these the dagger alone.
 fn name_front(figure: &mut Figure, grid: &Grid, dots: &[Dot<'_>], stairs: &[(f64, f64)], plot: Rect) {
     // Marks of points keep clear, and so do the lines of the front.
     let mut taken: Vec<Rect> = dots.iter().map(|d| Rect::new(d.at.0 - 5.0, d.at.1 - 5.0, 10.0, 10.0)).collect();
@@ -251,25 +289,51 @@ fn name_front(figure: &mut Figure, grid: &Grid, dots: &[Dot<'_>], stairs: &[(f64
         let (x, y) = (s[0].0.min(s[1].0), s[0].1.min(s[1].1));
         Rect::new(x - 1.0, y - 1.0, (s[1].0 - s[0].0).abs() + 2.0, (s[1].1 - s[0].1).abs() + 2.0)
     }));
-    let mut order: Vec<&Dot> = dots.iter().filter(|d| d.point.standing.on_front()).collect();
-    order.sort_by(|a, b| a.at.0.total_cmp(&b.at.0).then(a.point.combination.cmp(&b.point.combination)));
-    for dot in order {
+    // Of names and of lines to them: no other line goes through.
+    let mut words: Vec<Rect> = Vec::new();
+    for (i, dot) in in_turn(dots).into_iter().enumerate() {
         let name = &grid.combinations[dot.point.combination];
-        let (text, colour) = match &rows::price(dot.point.run) {
+        let price = rows::price(dot.point.run);
+        let (text, colour) = match &price {
             Some(price) => (format!("{name} {price}"), ALARM),
             None => (name.clone(), INK),
         };
         let style = plain(SMALL, colour).bold();
-        let Some((r, style, x, y)) = free_place(dot.at, &text, style, plot, &taken) else { continue };
+        // The two ends of a front are named wherever there is room.
+        let reach = if i < 2 { 14 } else { 3 };
+        let place = if words.len() < 2 * NAMES {
+            free_place(dot.at, &text, style, plot, (&taken, &words), reach)
+        } else {
+            None
+        };
+        let Some((r, style, x, y)) = place else {
+            if let (Some(_), Some((r, style, x, y))) =
+                (price, free_place(dot.at, "†", style, plot, (&taken, &words), 0))
+            {
+                figure.label(x, y, "†", style);
+                taken.push(r);
+            }
+            continue;
+        };
         figure.label(x, y, &text, style);
-        taken.push(r);
+        let (from, line) = leader(dot.at, r);
+        taken.extend([r, line]);
+        words.extend([r, line]);
         // A name that had to move away gets a thin line back to its dot.
-        let near = (x - dot.at.0).hypot(y - dot.at.1) < 20.0;
-        if !near {
-            let from = (dot.at.0.clamp(r.x, r.right()), if r.y > dot.at.1 { r.y } else { r.bottom() });
-            figure.segment(from, dot.at, FRAME, 0.8);
+        if (x - dot.at.0).hypot(y - dot.at.1) >= NEAR {
+            figure.segment(from, dot.at, MUTED, 0.8);
         }
     }
+}
+
+/// A name this close needs no line.
+const NEAR: f64 = 20.0;
+
+/// Where the line from a name to its dot begins, and what it covers.
+fn leader(dot: (f64, f64), name: Rect) -> ((f64, f64), Rect) {
+    let from = (dot.0.clamp(name.x, name.right()), if name.y > dot.1 { name.y } else { name.bottom() });
+    let (x, y) = (from.0.min(dot.0), from.1.min(dot.1));
+    (from, Rect::new(x, y, (from.0 - dot.0).abs(), (from.1 - dot.1).abs()))
 }
 
 /// A place for `name` that touches nothing: right of the dot, left, above, below.
@@ -278,7 +342,8 @@ fn free_place(
     name: &str,
     style: TextStyle,
     plot: Rect,
-    taken: &[Rect],
+    (taken, words): (&[Rect], &[Rect]),
+    reach: i32,
 ) -> Option<(Rect, TextStyle, f64, f64)> {
     let beside = [
         (Anchor::Start, 9.0, 3.6),
@@ -290,8 +355,8 @@ fn free_place(
         (Anchor::Middle, 0.0, -9.0),
         (Anchor::Middle, 0.0, 17.0),
     ];
-    // Then farther and farther above and below, as long as the panel lasts.
-    let away = (2..14).flat_map(|n| {
+    // Then farther above and below, within reach: what is far away is taken for another's name.
+    let away = (2..reach).flat_map(|n| {
         let d = 13.0 * f64::from(n);
         [(Anchor::Start, 6.0, -d), (Anchor::Start, 6.0, d), (Anchor::End, -6.0, -d), (Anchor::End, -6.0, d)]
     });
@@ -299,6 +364,8 @@ fn free_place(
         let style = TextStyle { anchor, ..style };
         let (x, y) = (at.0 + dx, at.1 + dy);
         let r = text_box(x, y, name, style);
-        (plot.contains(&r) && !taken.iter().any(|t| t.overlaps(&r))).then_some((r, style, x, y))
+        let far = dx.hypot(dy) >= NEAR;
+        let crosses = far && words.iter().any(|w| w.overlaps(&leader(at, r).1));
+        (plot.contains(&r) && !crosses && !taken.iter().any(|t| t.overlaps(&r))).then_some((r, style, x, y))
     })
 }

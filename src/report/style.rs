@@ -51,6 +51,9 @@ pub enum Shape {
 
 const SHAPES: [Shape; 6] = [Shape::Circle, Shape::Square, Shape::Diamond, Shape::Up, Shape::Down, Shape::Cross];
 
+/// Nobody looks up more markers than this.
+const MOST_LISTED: usize = 16;
+
 /// On and off lengths in pixels; empty is solid.
 const DASHES: [&[f64]; 6] =
     [&[], &[7.0, 3.0], &[2.0, 2.5], &[9.0, 2.5, 2.0, 2.5], &[13.0, 4.0], &[6.0, 2.0, 2.0, 2.0, 2.0, 2.0]];
@@ -129,9 +132,22 @@ impl Legend {
         Legend { entries: keep.iter().enumerate().map(look).collect(), ..Legend::default() }
     }
 
-    /// More combinations than there are markers: some look alike.
+    /// The kind of structure of an entry: its label up to the first parameter.
+    pub fn family(label: &str) -> &str {
+        label.split([':', ' ']).next().unwrap_or(label)
+    }
+
+    /// Families of these entries, each with a look of its own: for charts of more
+    /// combinations than a reader tells apart.
+    pub fn families(&self, keep: &[usize]) -> Legend {
+        let mut legend = Legend::default();
+        keep.iter().for_each(|c| legend.add(Legend::family(&self.entries[*c].label)));
+        legend
+    }
+
+    /// More combinations than a legend can list.
     pub fn overflows(&self) -> bool {
-        !self.systematic && self.entries.len() > PALETTE.len() * SHAPES.len()
+        !self.systematic && self.entries.len() > MOST_LISTED
     }
 
     /// An entry with a look of its own, for what is no combination.

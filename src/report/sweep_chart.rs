@@ -106,7 +106,7 @@ fn axes(figure: &mut Figure, chart: &Chart, plot: Rect, (x, y): (&Scale, &Scale)
             facets::axis_break(figure, plot, plot.bottom() - height - BREAK / 2.0);
         }
     }
-    facets::x_axis(figure, plot, x, (plot.w / 62.0) as usize, true);
+    facets::x_axis(figure, plot, x, (plot.w / 62.0) as usize);
     if let Kind::LogZero(bin) = x.kind {
         let at = plot.x + bin - BREAK / 2.0;
         figure.dashed(&[(at, plot.y), (at, plot.bottom())], FRAME, 0.8, 0.8, &[2.0, 3.0]);

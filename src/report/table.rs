@@ -46,7 +46,7 @@ impl Column {
         self
     }
 
-    fn heading(&self) -> String {
+    pub(super) fn heading(&self) -> String {
         if self.unit.is_empty() { self.name.clone() } else { format!("{} ({})", self.name, self.unit) }
     }
 }
@@ -136,18 +136,7 @@ impl Table {
     }
 
     pub fn latex(&self) -> String {
-        let align: String = self.columns.iter().map(|c| if c.numeric { 'r' } else { 'l' }).collect();
-        let line = |cells: Vec<String>| format!("    {} \\\\\n", cells.join(" & "));
-        let mut out = String::from("% needs \\usepackage{booktabs}\n\\begin{table}\n  \\centering\n");
-        out += &format!("  \\caption{{{}}}\n", format::latex(&self.title));
-        out += &format!("  \\label{{tab:{}}}\n  \\begin{{tabular}}{{{align}}}\n    \\toprule\n", self.id);
-        out += &line(self.columns.iter().map(|c| format::latex(&c.heading())).collect());
-        out += "    \\midrule\n";
-        for row in &self.rows {
-            out += &line(row.iter().map(|c| format::latex(&c.show())).collect());
-        }
-        out += "    \\bottomrule\n  \\end{tabular}\n\\end{table}\n";
-        out
+        super::table_latex::of(self)
     }
 
     pub fn html(&self) -> String {

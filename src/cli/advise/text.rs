@@ -1,16 +1,18 @@
 //! An advice for people.
 
 use crate::advice::{Advice, Considered, Objective};
+use crate::report::format::count;
 
 /// The whole of it; without `all` the twelve best predicted.
 pub fn of(advice: &Advice, scene: &str, path: &str, frames: usize, all: bool) -> String {
     let f = &advice.features;
     let percent = |x: f64| format!("{:.0} %", 100.0 * x);
     let mut out = format!(
-        "{scene}: {} triangles, {path}: {frames} frames, {} of them counted and {} timed\n\
+        "{scene}: {} triangles, {path}: {}, {} of them counted and {} timed\n\
          {} of the area is axis-aligned, {:.1} front faces behind a pixel, {} of the triangles in view \
          ({} of those face the eye), normals of 64 neighbours fill {} of a mask, {:.2} octree cells a triangle\n",
         f.triangles,
+        count(frames as u64, "frame", "frames"),
         advice.probe.len(),
         advice.timed.len(),
         percent(f.axis_aligned),

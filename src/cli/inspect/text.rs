@@ -57,11 +57,12 @@ impl Report<'_> {
             ),
             String::new(),
             format!(
-                "submitted  {} triangles ({:.2} % of the scene), {} entries, {} draw calls ({} ignoring materials)",
+                "submitted  {} triangles ({:.2} % of the scene), {} entries, {} draw {} ({} ignoring materials)",
                 group(e.submitted),
                 100.0 * e.submitted as f64 / n as f64,
                 group(e.submitted_entries),
                 group(calls),
+                if calls == 1 { "call" } else { "calls" },
                 group(calls_any)
             ),
         ];

@@ -83,6 +83,20 @@ fn runs_are_filtered_and_sorted_by_their_numbers() {
 }
 
 #[test]
+fn rows_that_differ_in_the_walk_alone_differ_in_a_query_without_columns() {
+    let mut results = fixture::sized(&fixture::SCENES[..1], 20, 3);
+    results.runs.truncate(1);
+    let mut other = results.runs[0].clone();
+    other.walk = "flat".into();
+    other.spec.walk = Spec::new("flat");
+    results.runs.push(other);
+    let text = print(&query(&results, &Query::default()).unwrap(), Format::Table).unwrap();
+    let rows: Vec<&str> = text.lines().skip(2).collect();
+    assert!(rows.len() == 2 && rows[0] != rows[1], "{text}");
+    assert!(rows[0].contains("depth_first") && rows[1].contains(" flat "), "{text}");
+}
+
+#[test]
 fn a_claim_pairs_what_takes_no_arithmetic_with_every_arithmetic() {
     let mut results = study();
     results.runs.pop();

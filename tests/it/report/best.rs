@@ -63,6 +63,20 @@ fn the_best_of_many_stands_against_the_best_of_the_rest() {
 }
 
 #[test]
+fn a_claim_about_culling_alone_is_not_saved_by_the_model_of_the_frame() {
+    let mut results = depths(5);
+    // Depth 4 culls slowest, and submits so little that its modelled frame is the shortest.
+    scale(&mut results.runs[1], 2.0);
+    results.runs[1].triangles.iter_mut().for_each(|t| *t = (*t / 50.0).floor());
+    let culling = only(&results, &best(4, "total_cull_ms"));
+    assert!(culling.ratio.unwrap().1 > 1.0 && culling.model_ratio.unwrap().2 < 1.0, "{culling:?}");
+    assert_eq!(culling.verdict, Verdict::Contradicted, "{culling:?}");
+    let frame = only(&results, &best(4, "total_frame_ms_model"));
+    assert_eq!((frame.ratio, frame.model_ratio), (culling.ratio, culling.model_ratio));
+    assert_eq!(frame.verdict, Verdict::ModelOnly, "{frame:?}");
+}
+
+#[test]
 fn where_more_is_better_the_ratio_is_turned_round() {
     let results = depths(5);
     let four = only(&results, &best(4, "fps_mean_model"));

@@ -1,8 +1,9 @@
 //! Claims about a metric itself: 0 everywhere, or a published value.
 
-use super::fixture;
+use super::{fixture, xml};
 use cullmark::claim::{Claim, Relation};
-use cullmark::report::claims::{Verdict, judge};
+use cullmark::report::claims::{Verdict, judge, judge_all};
+use cullmark::report::{forest, render};
 use cullmark::results::RunStatus;
 
 fn own(relation: Relation, metric: &str, culling: &str) -> Claim {
@@ -50,4 +51,29 @@ fn a_published_value_is_compared_with_the_metric_itself() {
     let verdicts: Vec<(&str, Verdict)> = found.groups.iter().map(|g| (g.name.as_str(), g.verdict)).collect();
     assert!(verdicts.contains(&("nucleus", Verdict::Reproduced)), "{verdicts:?}");
     assert!(verdicts.iter().all(|(name, _)| claim.published_for.contains_key(*name)), "{verdicts:?}");
+}
+
+#[test]
+fn a_claim_about_one_scene_names_it_and_the_chart_says_what_it_leaves_out() {
+    let results = fixture::study();
+    let ratio = |id: &str, scene: Option<&str>| {
+        let mut claim = Claim { for_each: None, ..fixture::claim(id, Relation::Greater) };
+        for selection in [&mut claim.numerator, &mut claim.denominator] {
+            selection.extend(scene.map(|s| ("scene".to_string(), vec![s.to_string()])));
+        }
+        claim
+    };
+    let mut lost = own(Relation::Zero, "potential_lost", "frustum");
+    lost.id = "loses-nothing".into();
+    let claims = [ratio("one", Some("ravine")), ratio("all", None), lost];
+    let judged = judge_all(&results, &claims);
+    assert_eq!((judged[0].groups[0].name.as_str(), judged[1].groups[0].name.as_str()), ("ravine", "everywhere"));
+    assert!(judged[0].summary.ends_with(" at ravine"), "{}", judged[0].summary);
+    let figure = forest::draw(&judged).unwrap();
+    let texts = xml::texts(&render::svg(&figure, true).unwrap()).unwrap();
+    assert!(texts.iter().any(|t| t == "ravine") && texts.iter().any(|t| t == "everywhere"), "{texts:?}");
+    for words in [texts.join(" "), figure.caption] {
+        assert!(words.contains("Not drawn") && words.contains("loses-nothing ("), "{words}");
+        assert!(!words.contains("one (") && !words.contains("all ("), "{words}");
+    }
 }

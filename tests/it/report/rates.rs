@@ -85,8 +85,31 @@ fn texts(table: &Table, row: &[Cell]) -> Vec<String> {
 }
 
 #[test]
+fn without_a_price_of_the_frame_times_are_shown_and_no_rates() {
+    let mut results = fixture::study();
+    assert!(results.runs.iter().all(|r| r.spec.model.frame_ns == 0.0));
+    let times = rates::all(&Grid::of(&results));
+    let head = times.csv().lines().next().unwrap().to_string();
+    assert!(head.contains("\"best, modelled (ms)\",\"worst, modelled (ms)\"") && !head.contains("fps"), "{head}");
+    assert!(!rates::words(&Grid::of(&results)).contains("Frames per second"));
+    let run = &results.runs[1];
+    let row = times.rows.iter().find(|r| r[0].show() == "nucleus" && r[1].show() == "list × frustum").unwrap();
+    let value = |name: &str| known(name).value(run).unwrap();
+    assert_eq!(row[3], Cell::Number(1e3 / value("fps_best_model")));
+    assert_eq!(row[4], Cell::Number(1e3 / value("fps_worst_model")));
+    let (mean, low, high) = known("frame_ms_model").interval(run).unwrap();
+    assert_eq!(row[5], Cell::Interval(mean, low, high));
+    let best = rates::best_table(&Grid::of(&results));
+    assert!(best.title.starts_with("Frame times") && best.csv().contains("(ms)") && !best.csv().contains("fps"));
+    // One run whose model has none is enough: rates and times do not share a column.
+    results.runs.iter_mut().skip(1).for_each(|r| r.spec.model.frame_ns = 1e6);
+    assert!(!rates::has_rates(&Grid::of(&results)));
+}
+
+#[test]
 fn every_run_has_its_row_and_the_fastest_of_a_scene_comes_first() {
-    let results = fixture::study();
+    let mut results = fixture::study();
+    results.runs.iter_mut().for_each(|r| r.spec.model.frame_ns = 1e6);
     let grid = Grid::of(&results);
     let table = rates::all(&grid);
     assert_eq!(table.rows.len(), results.runs.len());

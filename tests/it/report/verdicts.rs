@@ -39,10 +39,13 @@ fn agreement_of_the_model_alone_is_called_that() {
     use Verdict::{Contradicted, ModelOnly, Reproduced, Undecided};
     for (claim_is_modelled, measured, model, expected) in [
         (false, Some(Reproduced), Some(Contradicted), Reproduced),
-        (false, Some(Contradicted), Some(Reproduced), ModelOnly),
-        (false, Some(Undecided), Some(Reproduced), ModelOnly),
+        // A claim about culling alone: the model of the frame has no say in it.
+        (false, Some(Contradicted), Some(Reproduced), Contradicted),
+        (false, Some(Undecided), Some(Reproduced), Undecided),
         (false, Some(Contradicted), Some(Undecided), Contradicted),
-        (false, None, Some(Reproduced), ModelOnly),
+        (false, None, Some(Reproduced), Undecided),
+        (true, Some(Undecided), Some(Reproduced), ModelOnly),
+        (true, None, Some(Reproduced), ModelOnly),
         (true, Some(Reproduced), Some(Reproduced), Reproduced),
         (true, Some(Contradicted), Some(Reproduced), ModelOnly),
         (true, Some(Reproduced), Some(Contradicted), Contradicted),
