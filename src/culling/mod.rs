@@ -63,6 +63,7 @@ use crate::math::{Arithmetic, View, arithmetic};
 use crate::registry::{Default as Allowed, Entry, Param, Spec, Value, find};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
+pub use skipping::Skipping;
 pub use tally::Tally;
 
 /// What a method promises of its submitted set S against the visible set V*.
@@ -159,7 +160,7 @@ pub fn cull(
     out: &mut DrawList,
     tally: &mut Tally,
 ) {
-    if walk.without_judging(view, hierarchy, out, tally) {
+    if walk.skipping().is_some_and(|s| s.skips(view, hierarchy, out, tally)) {
         return;
     }
     out.clear();
@@ -170,7 +171,9 @@ pub fn cull(
     for test in tests.iter_mut() {
         test.filter(hierarchy, out, tally);
     }
-    walk.done(view, out);
+    if let Some(skipping) = walk.skipping() {
+        skipping.keep(view, out);
+    }
 }
 
 /// [`Test::judge_flat`] by way of [`Test::judge`].
@@ -200,23 +203,18 @@ pub trait Walk: Send {
     fn removes(&self) -> Removes {
         Removes::default()
     }
+    /// What lets it skip whole frames, if it has that.
+    fn skipping(&mut self) -> Option<&mut Skipping> {
+        None
+    }
     /// Forgets earlier frames, as [`Test::reset`].
-    fn reset(&mut self) {}
+    fn reset(&mut self) {
+        self.skipping().into_iter().for_each(Skipping::reset);
+    }
     /// Whether earlier frames of the pass may change what is submitted. If not, any
     /// frame can be culled by itself.
     fn remembers(&self) -> bool {
         true
-    }
-    /// Before anything of a frame: if the walk can tell what to draw although nothing is
-    /// judged, it leaves that in `out`, what the last frame left there or not, and says so.
-    fn without_judging(&mut self, view: &View, hierarchy: &Hierarchy, out: &mut DrawList, tally: &mut Tally) -> bool {
-        let _ = (view, hierarchy, out, tally);
-        false
-    }
-    /// After a frame that was judged, tests of triangles included. Between two resets a
-    /// walk serves one hierarchy and one sum of tests.
-    fn done(&mut self, view: &View, out: &mut DrawList) {
-        let _ = (view, out);
     }
     /// Appends what to draw for this frame. `tests` have begun the frame.
     fn run(

@@ -303,20 +303,12 @@ impl Walk for Portals {
         })
     }
 
-    fn reset(&mut self) {
-        self.skipping.reset();
+    fn skipping(&mut self) -> Option<&mut Skipping> {
+        Some(&mut self.skipping)
     }
 
     fn remembers(&self) -> bool {
         false
-    }
-
-    fn without_judging(&mut self, view: &View, h: &Hierarchy, out: &mut DrawList, tally: &mut Tally) -> bool {
-        self.skipping.skips(view, h, out, tally)
-    }
-
-    fn done(&mut self, view: &View, out: &mut DrawList) {
-        self.skipping.keep(view, out);
     }
 
     fn run(

@@ -37,25 +37,26 @@ impl Seen {
     }
 }
 
-/// The switches, and the frame before.
+/// The switches of a walk, and the frame before.
 #[derive(Debug, Default)]
-pub(super) struct Skipping {
+pub struct Skipping {
     whole_below: u32,
     still: bool,
     last: Option<(Seen, u64)>,
 }
 
 impl Skipping {
-    pub fn new(spec: &Spec) -> Skipping {
+    pub(super) fn new(spec: &Spec) -> Skipping {
         Skipping { whole_below: spec.int("whole_below") as u32, still: spec.bool("still"), last: None }
     }
 
-    pub fn reset(&mut self) {
+    pub(super) fn reset(&mut self) {
         self.last = None;
     }
 
-    /// See `Walk::without_judging`.
-    pub fn skips(&self, view: &View, hierarchy: &Hierarchy, out: &mut DrawList, tally: &mut Tally) -> bool {
+    /// Before anything of a frame: whether it can be told what to draw although nothing is
+    /// judged. That is then in `out`, what the last frame left there or not.
+    pub(super) fn skips(&self, view: &View, hierarchy: &Hierarchy, out: &mut DrawList, tally: &mut Tally) -> bool {
         let count = hierarchy.entries.len();
         if count <= self.whole_below as usize {
             out.clear();
@@ -70,8 +71,9 @@ impl Skipping {
         reused
     }
 
-    /// See `Walk::done`.
-    pub fn keep(&mut self, view: &View, out: &mut DrawList) {
+    /// After a frame that was judged, tests of triangles included. Between two resets a walk
+    /// serves one hierarchy and one sum of tests.
+    pub(super) fn keep(&mut self, view: &View, out: &mut DrawList) {
         if self.still {
             // One number a judged frame of the process: no two lists share one by chance.
             static JUDGED: AtomicU64 = AtomicU64::new(1);
