@@ -9,7 +9,8 @@ use crate::registry::format_sum;
 use crate::results::{RunResult, RunStatus, StudyResults};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Runs of one group, in pairs that agree in all axes neither selection fixes.
+/// Runs of one group, in pairs that agree in all axes that the two selections treat alike:
+/// neither names it, or both name the same.
 pub struct Pairs<'a> {
     pub name: String,
     pub scene_triangles: Option<f64>,
@@ -22,7 +23,7 @@ pub fn groups<'a>(results: &'a StudyResults, claim: &Claim) -> Vec<Pairs<'a>> {
         let structure = format_sum(std::slice::from_ref(&run.spec.structure));
         walks.entry(structure).or_default().insert(run.spec.walk.to_string());
     }
-    let fixed = |axis: &str| !claim.numerator.contains_key(axis) && !claim.denominator.contains_key(axis);
+    let fixed = |axis: &str| claim.numerator.get(axis) == claim.denominator.get(axis);
     let free = |run: &RunResult, arithmetic: &str| -> String {
         let mut axes = vec!["scene", "path", "structure", "culling", "walk", "arithmetic"];
         axes.extend(run.spec.axes.keys().map(String::as_str).filter(|a| !matches!(*a, "arithmetic" | "camera")));

@@ -1,7 +1,7 @@
 //! Further axes and numbers of runs in labels, queries and claims.
 
 use super::fixture;
-use cullmark::claim::Relation;
+use cullmark::claim::{Claim, Relation};
 use cullmark::record::{SceneSource, cameras};
 use cullmark::registry::{Spec, Value};
 use cullmark::report::claims::judge;
@@ -122,4 +122,21 @@ fn a_claim_pairs_what_takes_no_arithmetic_with_every_arithmetic() {
     claim.published = Some([0.0, 1e9]);
     let names: Vec<String> = judge(&study(), &claim).groups.into_iter().map(|g| g.name).collect();
     assert_eq!(names, ["perspective", "perspective:aspect=1.5,fov_y_deg=2.5"]);
+}
+
+/// Two scenes named on both sides are a part of the study, not a comparison of scenes.
+#[test]
+fn what_both_sides_select_alike_is_paired() {
+    let results = fixture::study();
+    let whole = fixture::claim("x", Relation::Less);
+    let mut part = whole.clone();
+    let scenes: Vec<String> = [0, 2].map(|i| fixture::SCENES[i].0.to_string()).into();
+    part.numerator.insert("scene".into(), scenes.clone());
+    part.denominator.insert("scene".into(), scenes.clone());
+    let of = |claim: &Claim| -> Vec<(String, Option<f64>)> {
+        judge(&results, claim).groups.into_iter().map(|g| (g.name, g.ratio.map(|r| r.0))).collect()
+    };
+    let expected: Vec<_> = of(&whole).into_iter().filter(|(name, _)| scenes.contains(name)).collect();
+    assert_eq!(of(&part), expected);
+    assert!(expected.len() == 2 && expected[0].1.is_some() && expected[0].1 != expected[1].1, "{expected:?}");
 }
