@@ -252,22 +252,28 @@ fn predict(
 
 const LOSSY: &str = "may lose visible triangles";
 
-/// The best predicted, but nothing twice: a test that removes nothing more than the sums
-/// before it did does not earn its place, and all but one are not left to one structure.
+/// The best predicted, but nothing twice: a test that removes nothing more than a shorter
+/// sum does not earn its place, and all but one are not left to one structure.
 fn short_list(considered: &[Considered], count: usize) -> Vec<usize> {
     let count = count.max(1);
     let most = count.div_ceil(2).max(1);
     let close = |a: f64, b: f64| (a - b).abs() <= 0.005 * a.max(b);
+    let idle = |c: &Considered| {
+        let Some(own) = &c.predicted else { return true };
+        considered.iter().any(|other| {
+            let (a, b) = (&other.combination, &c.combination);
+            let kin = a.structure == b.structure && a.walk == b.walk && a.culling.len() < b.culling.len();
+            let dearer = other.predicted_ns > c.predicted_ns.map(|ns| 1.005 * ns);
+            let same = |p: &Counts| close(p.entries, own.entries) && close(p.draw_calls, own.draw_calls);
+            kin && !dearer && other.predicted.as_ref().is_some_and(same)
+        })
+    };
     let mut chosen: Vec<usize> = Vec::new();
     let mut later = Vec::new();
-    for i in 0..considered.len() {
-        let (c, Some(p)) = (&considered[i], &considered[i].predicted) else { continue };
-        let kin = |j: &&usize| considered[**j].combination.structure == c.combination.structure;
-        let idle = |j: &usize| {
-            let other = considered[*j].predicted.as_ref();
-            other.is_some_and(|o| close(o.entries, p.entries) && close(o.draw_calls, p.draw_calls))
-        };
-        if chosen.iter().filter(kin).any(idle) || chosen.iter().filter(kin).count() >= most {
+    for i in (0..considered.len()).filter(|i| considered[*i].predicted.is_some()) {
+        let c = &considered[i];
+        let kin = chosen.iter().filter(|j| considered[**j].combination.structure == c.combination.structure);
+        if kin.count() >= most || idle(c) {
             later.push(i);
         } else if chosen.len() < count {
             chosen.push(i);
