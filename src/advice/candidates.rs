@@ -54,7 +54,11 @@ pub fn product<T: AsRef<str>>(structures: &[T], cullings: &[T]) -> Result<Vec<Co
 pub fn with_mailboxes(all: &[Combination]) -> Vec<Combination> {
     let asked = |c: &Combination| !c.culling.is_empty() && c.culling.iter().all(|t| t.kind != mailbox::NAME);
     let once = |c: &Combination| {
-        let culling = c.culling.iter().cloned().chain([Spec::new(mailbox::NAME)]).collect();
+        // What judges single triangles has fewer of them to judge after it.
+        let by_triangle = |t: &Spec| matches!(t.kind.as_str(), "back_face" | "look_at" | "sector");
+        let mut culling = c.culling.clone();
+        let at = culling.iter().position(by_triangle).unwrap_or(culling.len());
+        culling.insert(at, Spec::new(mailbox::NAME));
         Combination { culling, ..c.clone() }
     };
     all.iter().filter(|c| mailbox::has_copies(&c.structure) && asked(c)).map(once).collect()
