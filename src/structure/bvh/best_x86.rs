@@ -45,6 +45,15 @@ pub fn half_areas(e: &[[f32; 4]; 8]) -> __m256 {
     _mm256_add_ps(xy_yz, _mm256_mul_ps(z, x))
 }
 
+/// The least of eight numbers.
+#[target_feature(enable = "avx2")]
+#[inline]
+pub fn least_of(all: __m256) -> f32 {
+    let low = _mm_min_ps(_mm256_castps256_ps128(all), _mm256_extractf128_ps::<1>(all));
+    let low = _mm_min_ps(low, _mm_movehl_ps(low, low));
+    _mm_cvtss_f32(_mm_min_ss(low, _mm_shuffle_ps::<1>(low, low)))
+}
+
 /// Sums of all counts before each bin, and of all, in every lane; bins past the last are empty.
 #[target_feature(enable = "avx2")]
 #[inline]
@@ -108,9 +117,7 @@ fn best_256(all: &Bins, bins: usize) -> Option<Split> {
             unsafe { _mm256_storeu_ps(costs[axis * stride + group..][..8].as_mut_ptr(), cost) };
         }
     }
-    let low = _mm_min_ps(_mm256_castps256_ps128(least), _mm256_extractf128_ps::<1>(least));
-    let low = _mm_min_ps(low, _mm_movehl_ps(low, low));
-    let cost = _mm_cvtss_f32(_mm_min_ss(low, _mm_shuffle_ps::<1>(low, low)));
+    let cost = least_of(least);
     if cost == f32::INFINITY {
         return None;
     }

@@ -3,7 +3,7 @@
 //! are filled up with empty ones behind them, so that nothing branches on their number.
 //! Bits are those of `sweep::Sweep`.
 
-use super::best_x86::{edges, half_areas, transposed};
+use super::best_x86::{edges, half_areas, least_of, transposed};
 use super::bins_x86::{bare, centre2, has_avx2, load_record, store_record};
 use super::record::{Record, Span};
 use super::sweep::Cut;
@@ -110,9 +110,7 @@ fn cut_256(records: &[Record], out: &mut [Record]) -> Option<Cut> {
         // Not a number is never the least.
         least = _mm256_min_ps(cost, least);
     }
-    let low = _mm_min_ps(_mm256_castps256_ps128(least), _mm256_extractf128_ps::<1>(least));
-    let low = _mm_min_ps(low, _mm_movehl_ps(low, low));
-    let cost = _mm_cvtss_f32(_mm_min_ss(low, _mm_shuffle_ps::<1>(low, low)));
+    let cost = least_of(least);
     if cost == f32::INFINITY {
         return None;
     }
