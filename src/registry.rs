@@ -118,7 +118,9 @@ impl Spec {
         }
         for param in params {
             if matches!(param.default.plain(), Default::Axis(_)) {
-            } else if !param.default.is_later() {
+                continue;
+            }
+            if !param.default.is_later() {
                 out.params.entry(param.name.to_string()).or_insert_with(|| param.default.value());
             } else if out.params.get(param.name) == Some(&param.default.value()) {
                 out.params.remove(param.name);
