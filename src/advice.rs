@@ -174,7 +174,7 @@ pub fn advise(question: &Question) -> Result<Advice> {
         objective: question.objective,
         features,
         sample_triangles: sample.scene.len(),
-        one_in: sample.one_in,
+        one_in: sample.scale.one_in,
         probe,
         timed,
         considered,
@@ -203,7 +203,6 @@ fn predict(
     views: &[View],
     considered: &mut [Considered],
 ) {
-    let whole = sample::Sample::whole();
     let mut order: Vec<usize> = (0..considered.len()).collect();
     order.sort_by_key(|i| considered[*i].combination.structure.to_string());
     let mut last: Option<(Spec, Result<Built>)> = None;
@@ -218,11 +217,11 @@ fn predict(
             continue;
         }
         // What looks through walls needs all of them.
-        let (scene, sample) = match c.combination.structure.kind.as_str() {
-            "portal_octree" => (question.scene, &whole),
-            _ => (&sample.scene, sample),
+        let (scene, scale) = match c.combination.structure.kind.as_str() {
+            "portal_octree" => (question.scene, sample::Scale::WHOLE),
+            _ => (&sample.scene, sample.scale),
         };
-        let scaled = sample::scaled(&c.combination.structure, sample.one_in);
+        let scaled = sample::scaled(&c.combination.structure, scale.one_in);
         let same = last.as_ref().is_some_and(|(spec, _)| *spec == scaled);
         if !same {
             let own = Combination { structure: scaled.clone(), ..c.combination.clone() };
@@ -240,10 +239,10 @@ fn predict(
                 c.left_out = Some(LOSSY.into());
             }
             Ok((class, counts)) => {
-                let counts = counts.scaled(sample);
-                let (scale, drawn) = question.parts(counts.draw_ns(&question.model));
+                let counts = counts.scaled(scale);
+                let (culled, drawn) = question.parts(counts.draw_ns(&question.model));
                 c.class = Some(class);
-                c.predicted_ns = Some(scale * cost::cull_ns(&counts) + drawn);
+                c.predicted_ns = Some(culled * cost::cull_ns(&counts) + drawn);
                 c.predicted = Some(counts);
             }
         }

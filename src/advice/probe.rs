@@ -1,6 +1,6 @@
 //! The frames of the probe, counting work on them and timing it.
 
-use super::sample::Sample;
+use super::sample::Scale;
 use super::{Combination, Considered, Question};
 use crate::culling::{self, Class, DrawList, Tally, Test, Walk, cull};
 use crate::error::{Error, Result};
@@ -51,11 +51,11 @@ impl Counts {
     }
 
     /// Of a sample to the whole: what goes with triangles or materials grows, nodes stay.
-    pub fn scaled(mut self, sample: &Sample) -> Counts {
-        let one_in = f64::from(sample.one_in);
+    pub fn scaled(mut self, scale: Scale) -> Counts {
+        let one_in = f64::from(scale.one_in);
         self.entries *= one_in;
         let ranges = self.of("ranges").min(self.draw_calls);
-        self.draw_calls = ranges + (self.draw_calls - ranges) * sample.material_changes;
+        self.draw_calls = ranges + (self.draw_calls - ranges) * scale.material_changes;
         for name in ["triangle_tests", "predicates", "notes_read", "copies_dropped"] {
             if let Some(x) = self.work.get_mut(name) {
                 *x *= one_in;
@@ -165,7 +165,6 @@ impl Built {
         if self.hierarchy.links.len() == self.hierarchy.root_blocks as usize {
             let scanned = counts.work.insert("nodes_visited", 0.0).unwrap_or_default();
             counts.work.insert("nodes_scanned", scanned);
-            counts.work.insert("plane_tests", 0.0);
         }
         (counts.entries, counts.draw_calls) = (mean(entries), mean(calls));
         counts

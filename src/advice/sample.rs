@@ -14,6 +14,12 @@ const TRIANGLES_MAX: usize = 1 << 15;
 
 pub struct Sample {
     pub scene: Scene,
+    pub scale: Scale,
+}
+
+/// How a sample stands to the scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Scale {
     /// Of how many triangles it takes one.
     pub one_in: u32,
     /// How many more changes of material there are within the leaves of the scene than
@@ -25,18 +31,18 @@ impl Sample {
     pub fn of(scene: &Scene) -> Sample {
         let one_in = scene.len().div_ceil(TRIANGLES_MAX).max(1);
         let chosen: Vec<u32> = (0..scene.len() as u32).step_by(one_in).collect();
-        let mut sample = Sample { scene: scene.part(&chosen), one_in: one_in as u32, material_changes: 1.0 };
+        let mut sample = Sample { scene: scene.part(&chosen), scale: Scale { one_in: one_in as u32, ..Scale::WHOLE } };
         if one_in > 1 {
             let of = |scene: &Scene, one_in: u32| changes(scene, one_in).max(1.0);
-            sample.material_changes = (of(scene, 1) / of(&sample.scene, sample.one_in)).max(1.0);
+            sample.scale.material_changes = (of(scene, 1) / of(&sample.scene, one_in as u32)).max(1.0);
         }
         sample
     }
+}
 
-    /// The scene as its own sample.
-    pub fn whole() -> Sample {
-        Sample { scene: Scene::default(), one_in: 1, material_changes: 1.0 }
-    }
+impl Scale {
+    /// Of the scene as its own sample.
+    pub const WHOLE: Scale = Scale { one_in: 1, material_changes: 1.0 };
 }
 
 /// Changes of material within the clusters of a list.

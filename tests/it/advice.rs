@@ -75,14 +75,14 @@ fn who_wants_culling_alone_is_not_told_to_cull_nothing() {
 fn counts_on_a_sample_are_about_those_on_the_scene() {
     let (scene, poses) = place("arena:map=gold_rush", "walk:frames=400,seed=5");
     let sample = sample::Sample::of(&scene);
-    assert_eq!((sample.one_in, sample.scene.len()), (5, scene.len().div_ceil(5)));
+    assert_eq!((sample.scale.one_in, sample.scene.len()), (5, scene.len().div_ceil(5)));
     let views: Vec<View> =
         frames(poses.len(), 32).iter().map(|f| View::new(&Camera::default(), &poses[*f as usize])).collect();
     for c in candidates::product(STRUCTURES, &["frustum", "frustum+back_face"]).unwrap() {
         let whole = Built::new(&scene, &c).unwrap().pass(&views);
         let mut small = c.clone();
-        small.structure = sample::scaled(&c.structure, sample.one_in);
-        let guess = Built::new(&sample.scene, &small).unwrap().pass(&views).scaled(&sample);
+        small.structure = sample::scaled(&c.structure, sample.scale.one_in);
+        let guess = Built::new(&sample.scene, &small).unwrap().pass(&views).scaled(sample.scale);
         let off = |of: fn(&Counts) -> f64| (of(&guess) / of(&whole)).ln().abs().exp();
         let nodes = |c: &Counts| c.of("nodes_visited") + c.of("nodes_scanned");
         let (entries, nodes) = (off(|c| c.entries), off(nodes));
