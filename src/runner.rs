@@ -31,6 +31,7 @@ pub struct Setup {
     pub load_ns: u64,
     pub build_ns: u64,
     pub prepare_ns: u64,
+    /// Of the tests' columns and of what the walk keeps.
     pub test_bytes: u64,
 }
 
@@ -78,17 +79,18 @@ impl Setup {
         camera: &Camera,
         structure: &dyn Structure,
         mut tests: Vec<Box<dyn Test>>,
-        walk: Box<dyn Walk>,
+        mut walk: Box<dyn Walk>,
     ) -> Result<Setup> {
         let start = Instant::now();
         let hierarchy = structure.build(&scene)?;
         let build_ns = elapsed_ns(start);
-        let start = Instant::now();
-        let test_bytes = tests.iter_mut().map(|t| t.prepare(&scene, &hierarchy) as u64).sum();
-        let prepare_ns = elapsed_ns(start);
         if let Some(why) = walk.refuses(&hierarchy) {
             return Err(Error::new(format!("the walk cannot run over this structure: {why}")));
         }
+        let start = Instant::now();
+        let of_tests: usize = tests.iter_mut().map(|t| t.prepare(&scene, &hierarchy)).sum();
+        let test_bytes = (of_tests + walk.prepare(&scene, &hierarchy)) as u64;
+        let prepare_ns = elapsed_ns(start);
         let (class, removes) = culling::promise(&tests, walk.as_ref());
         let views = poses.iter().map(|p| View::new(camera, p)).collect();
         Ok(Setup {

@@ -128,7 +128,8 @@ impl Built {
         if let Some(why) = self.walk.refuses(&self.hierarchy) {
             return Err(Error::new(format!("the walk cannot run over this structure: {why}")));
         }
-        self.test_bytes = self.tests.iter_mut().map(|t| t.prepare(scene, &self.hierarchy)).sum();
+        let of_tests: usize = self.tests.iter_mut().map(|t| t.prepare(scene, &self.hierarchy)).sum();
+        self.test_bytes = of_tests + self.walk.prepare(scene, &self.hierarchy);
         self.prepared = Some(combination.clone());
         Ok(())
     }

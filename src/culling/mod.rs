@@ -196,6 +196,12 @@ pub fn judge_flat_by_block<T: Test + ?Sized>(
 pub trait Walk: Send {
     /// A reason why this walk cannot run on `hierarchy`, if it cannot.
     fn refuses(&self, hierarchy: &Hierarchy) -> Option<String>;
+    /// Builds what the walk itself keeps of scene and hierarchy (occluders, adjacency);
+    /// returns its bytes. Timed as part of building; never asked of what it refuses.
+    fn prepare(&mut self, scene: &Scene, hierarchy: &Hierarchy) -> usize {
+        let _ = (scene, hierarchy);
+        0
+    }
     /// What the walk itself promises and is entitled to remove, whatever the tests.
     fn class(&self) -> Class {
         Class::Conservative
