@@ -23,6 +23,7 @@ pub mod machine;
 pub mod math;
 pub mod oracle;
 pub mod preview;
+pub mod raster;
 pub mod record;
 pub mod registry;
 pub mod runner;
