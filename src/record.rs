@@ -321,7 +321,8 @@ pub struct TrialRecord {
     /// Sums over the frames of the path; identical between trials.
     pub counters: Vec<Counter>,
     /// `cull_ns` (the smallest of the passes) and, identical between trials,
-    /// `triangles`, `draw_calls`, `draw_calls_any_material`, `nodes_visited`.
+    /// `triangles`, `entries`, `draw_calls`, `draw_calls_any_material`, `nodes_visited`, and
+    /// what else is counted by frame ([`crate::culling::Tally::BY_FRAME`]).
     pub series: Vec<Series>,
     /// `cull_ns` of every pass, frame by frame.
     pub passes_ns: Vec<Vec<f64>>,

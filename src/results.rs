@@ -120,6 +120,9 @@ pub struct RunResult {
     pub entries: Vec<f64>,
     pub draw_calls: Vec<f64>,
     pub nodes_visited: Vec<f64>,
+    /// What only some methods count frame by frame: `queries`, `virtual_ns`, ...
+    #[serde(default)]
+    pub further: BTreeMap<String, Vec<f64>>,
     /// Per-trial `cull_ns`, for bands and the bootstrap.
     pub trial_cull_ns: Vec<Vec<f64>>,
     /// Sums over the path and structure figures (`nodes`, `leaves`, `structure_bytes`, ...).

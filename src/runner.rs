@@ -273,6 +273,11 @@ fn record(
             counters.push(Counter { name: name.to_string(), unit: unit.to_string(), value });
         }
     }
+    for name in Tally::BY_FRAME {
+        let i = Tally::default().named().iter().position(|(n, _, _)| *n == name).expect("a counter has that name");
+        let further = column(name, Tally::default().named()[i].1, &|w| w.tally.named()[i].2);
+        series.extend(Some(further).filter(|s| s.values.iter().any(|v| *v != 0.0)));
+    }
     let load = &setup.scene.report;
     for (name, value) in [
         ("faces_in_file", load.triangles_in_file),

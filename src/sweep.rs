@@ -16,6 +16,10 @@ pub struct Sweep {
     pub x_unit: String,
     /// Name of a metric.
     pub y: String,
+    /// Name of the metric to the right instead of x: then x is a knob that moves a run
+    /// along its line, and each point is labelled with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub against: Option<String>,
     /// Axis whose values are the lines, such as `arithmetic`.
     pub by: String,
     pub x_log: bool,

@@ -70,4 +70,7 @@ impl Tally {
     /// The first so many counters are part of every record; a later one only where it is
     /// not 0, so that trials stored before it came still count the same things.
     pub const ALWAYS: usize = 8;
+    /// Counters that are kept frame by frame where they are not 0: what charts draw
+    /// against the frame.
+    pub const BY_FRAME: [&str; 0] = [];
 }

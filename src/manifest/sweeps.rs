@@ -44,6 +44,13 @@ fn sweep(mut f: Fields, id: Option<String>) -> Option<Drawn> {
     let title = f.text("title").map(|t| t.trim().to_string()).filter(|t| !t.is_empty());
     let x = number(&mut f);
     let y = metric(&mut f, "y", "what is drawn, such as y = \"false_cull_ppm\"");
+    let against = match f.has("against") {
+        true => Some(metric(&mut f, "against", "what lies to the right, such as against = \"false_cull_ppm\"")),
+        false => {
+            f.known("against");
+            None
+        }
+    };
     let by = by(&mut f);
     let x_unit = f.text("x_unit").map(str::to_string);
     let scales = [("log", true), ("linear", false)];
@@ -55,7 +62,11 @@ fn sweep(mut f: Fields, id: Option<String>) -> Option<Drawn> {
     let (at_x, at_expected) = (place_of(&mut f, "x"), place_of(&mut f, "expected"));
     f.finish();
     let (id, x, y, expected) = (id?, x?, y?, expected?);
-    let title = title.unwrap_or_else(|| format!("{y} against {x}"));
+    let against = match against {
+        Some(metric) => Some(metric?),
+        None => None,
+    };
+    let title = title.unwrap_or_else(|| format!("{y} against {}", against.as_ref().unwrap_or(&x)));
     let x_unit = x_unit.unwrap_or_else(|| unit(&x).to_string());
     let Expected { slope, of, why } = expected;
     let sweep = Sweep {
@@ -64,6 +75,7 @@ fn sweep(mut f: Fields, id: Option<String>) -> Option<Drawn> {
         x,
         x_unit,
         y,
+        against,
         by: by?,
         x_log,
         y_log,

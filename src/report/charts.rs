@@ -8,6 +8,7 @@ use super::forest;
 use super::format::{self, count};
 use super::labels::Grid;
 use super::metrics::{frames, known};
+use super::occlusion;
 use super::rows::{self, Datum, Rows};
 use super::scatter::{self, Scatter};
 use super::style::IDLE;
@@ -20,6 +21,9 @@ pub fn all(grid: &Grid, judged: &[Judged]) -> Vec<Figure> {
         return Vec::new();
     }
     let mut figures = vec![total_model(grid), total_time(grid), time_per_frame(grid), triangles_per_frame(grid)];
+    if occlusion::concerns(grid) {
+        figures.extend(occlusion::all(grid));
+    }
     figures.extend(correlation::draw(grid));
     if grid.runs().any(|r| !r.errors.is_empty()) {
         figures.extend(errors(grid));
@@ -44,7 +48,7 @@ pub fn basis(grid: &Grid) -> String {
     format!("{}, {}", say(f, "frame", "frames"), say(t, "repeat", "repeats"))
 }
 
-fn with_caption(mut figure: Figure, caption: String) -> Figure {
+pub(super) fn with_caption(mut figure: Figure, caption: String) -> Figure {
     figure.caption = caption;
     figure
 }

@@ -1,6 +1,7 @@
 //! Every number a report, a query, a comparison or a claim can be about, in one table.
 
 use super::over_frames as frame;
+use super::virtual_clock;
 use crate::claim::Better;
 use crate::error::{Error, Result, did_you_mean};
 use crate::results::{RunResult, RunStatus};
@@ -111,6 +112,9 @@ pub static METRICS: &[Metric] = &[
     metric("frame_ms_model", "ms", Modelled, "culling + indices + draw calls, a frame, mean over the path", |r| {
         modelled(r).iter().map(|total| total / frames(r) as f64).collect()
     }),
+    metric("frame_ms_virtual", "ms", Modelled, "frame on the virtual clock, stalls of queries included, mean", |r| {
+        average(&virtual_clock::frames_ms(r))
+    }),
     metric("judged_frames", "frames", Judged, "frames compared with the truth", |r| {
         if r.errors.is_empty() { vec![] } else { vec![r.errors.len() as f64] }
     })
@@ -129,6 +133,10 @@ pub static METRICS: &[Metric] = &[
         average(r.drawn())
     }),
     metric("mean_nodes_visited", "nodes", Counted, "nodes judged a frame", |r| average(&r.nodes_visited)),
+    metric("mean_queries", "queries", Counted, "occlusion queries a frame", |r| by_frame(r, "queries")),
+    metric("mean_stall_us", "µs", Modelled, "waiting for answers of queries, a frame, on the virtual clock", |r| {
+        by_frame(r, "stall_ns").iter().map(|ns| ns / 1e3).collect()
+    }),
     metric("mean_triangles", "triangles", Counted, "triangles submitted a frame", |r| average(&r.triangles)),
     metric("median_frame_us", "µs", Measured, "culling time of the median frame", |r| {
         per_frame(r, stats::median, 1e3)
@@ -292,6 +300,11 @@ fn average(values: &[f64]) -> Vec<f64> {
 
 fn counter(run: &RunResult, name: &str) -> Vec<f64> {
     run.counters.get(name).copied().into_iter().collect()
+}
+
+/// Mean over the frames of a counter that only some methods have.
+fn by_frame(run: &RunResult, name: &str) -> Vec<f64> {
+    counter(run, name).iter().map(|sum| sum / frames(run) as f64).collect()
 }
 
 type OfFrame = fn(&crate::record::FrameErrors) -> f64;

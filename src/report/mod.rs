@@ -26,8 +26,10 @@ pub mod forest;
 pub mod format;
 pub mod frontier;
 pub mod frontier_table;
+pub mod knobs;
 pub mod labels;
 pub mod metrics;
+pub mod occlusion;
 pub mod over_frames;
 mod own_value;
 pub mod page;
@@ -51,6 +53,7 @@ pub mod sweeps;
 pub mod table;
 mod table_latex;
 pub mod tables;
+pub mod virtual_clock;
 
 use crate::claim::Claim;
 use crate::error::{Error, Result};
@@ -113,7 +116,8 @@ pub fn write_with_series(
         tables::environments(results),
     ];
     for chart in sweeps.iter().flatten() {
-        tables.extend([sweep_tables::points(chart), sweep_tables::slopes(chart)]);
+        tables.push(sweep_tables::points(chart));
+        tables.extend(chart.against.is_none().then(|| sweep_tables::slopes(chart)));
     }
     if let Some(again) = &again {
         use repeatability_tables::{agreements, differences, readings};

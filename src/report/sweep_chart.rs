@@ -6,6 +6,7 @@ use super::facets::{self, BODY, SMALL, Sample};
 use super::figure::{Figure, Part, Rect, plain};
 use super::font;
 use super::format;
+use super::knobs;
 use super::scale::{BREAK, Kind, Scale};
 use super::style::{ALARM, FRAME, INK, Legend, Look, MUTED, SHADE, Shape};
 use super::sweeps::{Chart, Line, Panel, Point};
@@ -17,6 +18,9 @@ const STRIP: f64 = 20.0;
 const BIN: f64 = 58.0;
 
 pub fn draw(chart: &Chart) -> Figure {
+    if let Some(against) = chart.against {
+        return knobs::draw(chart, against);
+    }
     let n = chart.panels.len().max(1);
     let columns = match n {
         1 => 1,
@@ -57,7 +61,7 @@ pub fn draw(chart: &Chart) -> Figure {
     figure
 }
 
-fn legend(chart: &Chart) -> Legend {
+pub(super) fn legend(chart: &Chart) -> Legend {
     let mut legend = Legend::default();
     for line in chart.panels.iter().flat_map(|p| &p.lines) {
         legend.add(&line.by);
@@ -84,7 +88,7 @@ fn scales(chart: &Chart) -> (Scale, Scale) {
     (x, y)
 }
 
-fn axis_words(name: &str, unit: &str) -> String {
+pub(super) fn axis_words(name: &str, unit: &str) -> String {
     // A unit that ends the name is said once.
     let name = name.strip_suffix(unit).and_then(|n| n.strip_suffix('_')).unwrap_or(name).replace(['.', '_'], " ");
     if unit.is_empty() { name } else { format!("{name} ({unit})") }
@@ -119,7 +123,7 @@ fn axes(figure: &mut Figure, chart: &Chart, plot: Rect, (x, y): (&Scale, &Scale)
 }
 
 /// The title of a panel, cut where it would leave it: the table has all of it.
-fn head(figure: &mut Figure, plot: Rect, title: &str) {
+pub(super) fn head(figure: &mut Figure, plot: Rect, title: &str) {
     let fits = |text: &str| font::width(text, facets::HEAD, true) <= plot.w;
     let mut text = title.to_string();
     if !fits(&text) {

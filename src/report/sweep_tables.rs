@@ -1,6 +1,6 @@
 //! The numbers behind the charts of sweeps: every point, and how fast each line grows.
 
-use super::sweeps::Chart;
+use super::sweeps::{Chart, value};
 use super::table::{Cell, Column, Table, column, interval, number};
 use crate::results::RunStatus;
 
@@ -9,8 +9,9 @@ pub fn points(chart: &Chart) -> Table {
     let s = chart.sweep;
     let counts = [("wrong", RunStatus::Wrong), ("failed", RunStatus::Failed), ("pending", RunStatus::Pending)];
     let mut columns = vec![Column::text("panel"), Column::text(&s.by)];
-    columns.push(column(&s.x, &s.x_unit, "the stressor"));
+    columns.push(column(&s.x, &s.x_unit, if chart.against.is_some() { "the knob" } else { "the stressor" }));
     columns.push(column(chart.metric.name, chart.metric.unit, chart.metric.about).with_interval());
+    columns.extend(chart.against.map(|m| column(m.name, m.unit, m.about).with_interval()));
     columns.push(column("runs", "", "runs that share this place"));
     columns.extend(counts.map(|(name, _)| column(name, "", "of these")));
     columns.extend([Column::text("why"), Column::text("measurements")]);
@@ -20,6 +21,7 @@ pub fn points(chart: &Chart) -> Table {
             for p in &line.points {
                 let mut row = vec![Cell::Text(panel.title.clone()), Cell::Text(line.by.clone()), Cell::Number(p.x)];
                 row.push(interval(p.value));
+                row.extend(chart.against.map(|m| interval(value(m, &p.runs))));
                 row.push(Cell::Number(p.runs.len() as f64));
                 row.extend(counts.map(|(_, status)| Cell::Number(p.with(status) as f64)));
                 let reasons: Vec<&str> =

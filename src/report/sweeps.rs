@@ -18,6 +18,8 @@ use crate::sweep::Sweep;
 pub struct Chart<'a> {
     pub sweep: &'a Sweep,
     pub metric: &'static Metric,
+    /// To the right, where x is a knob.
+    pub against: Option<&'static Metric>,
     pub panels: Vec<Panel<'a>>,
 }
 
@@ -63,6 +65,7 @@ pub struct Slope {
 /// In words for the page, when the sweep names what the study does not have.
 pub fn chart<'a>(results: &'a StudyResults, sweep: &'a Sweep) -> Result<Chart<'a>, String> {
     let metric = metrics::get(&sweep.y).map_err(|e| e.to_string())?;
+    let against = sweep.against.as_ref().map(|name| metrics::get(name).map_err(|e| e.to_string())).transpose()?;
     let mut panels: Vec<(Vec<(String, String)>, Panel)> = Vec::new();
     let follows = camera_follows(results, &sweep.x);
     for run in &results.runs {
@@ -96,7 +99,7 @@ pub fn chart<'a>(results: &'a StudyResults, sweep: &'a Sweep) -> Result<Chart<'a
             line.points.iter_mut().for_each(|p| p.value = value(metric, &p.runs));
         }
     }
-    Ok(Chart { sweep, metric, panels })
+    Ok(Chart { sweep, metric, against, panels })
 }
 
 /// The value of the axis whose values are the lines.
@@ -206,7 +209,8 @@ fn titles(families: &[&Vec<(String, String)>]) -> Vec<String> {
     families.iter().map(|f| of(f)).collect()
 }
 
-fn value(metric: &Metric, runs: &[&RunResult]) -> Option<(f64, f64, f64)> {
+/// Median over the runs that are done, smallest and largest; of one run its interval.
+pub fn value(metric: &Metric, runs: &[&RunResult]) -> Option<(f64, f64, f64)> {
     // Wrong runs show their errors in tables; on a chart of growth they are marks of their own.
     let done: Vec<&&RunResult> = runs.iter().filter(|r| r.status == RunStatus::Done).collect();
     if let [run] = done[..] {

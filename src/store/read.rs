@@ -3,6 +3,7 @@
 
 use super::fetch::{Scope, SeriesRow, TrialRow};
 use super::{Store, blob};
+use crate::culling::Tally;
 use crate::error::{Error, ErrorKind, Result, did_you_mean};
 use crate::record::{Judgement, observed_class};
 use crate::results::{Excluded, RunResult, RunStatus, StudyResults, TrialSummary};
@@ -232,6 +233,13 @@ impl Store {
             Some(s) => decode(s),
             None => Ok(Vec::new()),
         };
+        let mut further = BTreeMap::new();
+        for name in Tally::BY_FRAME {
+            let values = counted(name)?;
+            if !values.is_empty() {
+                further.insert(name.to_string(), values);
+            }
+        }
         let mut trial_cull_ns = Vec::new();
         for t in &best {
             let times =
@@ -259,6 +267,7 @@ impl Store {
             entries: counted("entries")?,
             draw_calls: counted("draw_calls")?,
             nodes_visited: counted("nodes_visited")?,
+            further,
             trial_cull_ns,
             counters: counters.cloned().unwrap_or_default(),
             errors: judgement.map_or_else(Vec::new, |j| j.frames.clone()),

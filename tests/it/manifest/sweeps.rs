@@ -25,16 +25,24 @@ by = "camera"
 x_scale = "linear"
 y_scale = "linear"
 expected = { slope = 0.5, of = "perspective", why = "a tree of branching eight" }
+[[sweep]]
+id = "knob"
+x = "structure.depth"
+y = "total_cull_ms"
+against = "over_submission"
 "#,
         &[],
     );
-    let [angle, depth] = &manifest.sweeps()[..] else { panic!("two sweeps") };
+    let [angle, depth, knob] = &manifest.sweeps()[..] else { panic!("three sweeps") };
+    assert_eq!(knob.against.as_deref(), Some("over_submission"));
+    assert_eq!(knob.title, "total_cull_ms against over_submission");
     let expected = Sweep {
         id: "angle".into(),
         title: "over_submission against camera.fov_y_deg".into(),
         x: "camera.fov_y_deg".into(),
         x_unit: "°".into(),
         y: "over_submission".into(),
+        against: None,
         by: "arithmetic".into(),
         x_log: true,
         y_log: true,

@@ -183,6 +183,7 @@ pub fn run(
         draw_calls,
         entries: Vec::new(),
         nodes_visited: nodes,
+        further: Default::default(),
         trial_cull_ns,
         counters: counters.map(|(k, v)| (k.to_string(), v)).into(),
         errors,

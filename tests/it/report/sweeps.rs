@@ -1,5 +1,8 @@
 //! Errors against stressors: which runs meet on a line, zeros, what failed, growth.
 
+#[path = "sweeps/knobs.rs"]
+mod knobs;
+
 use super::fixture;
 use cullmark::math::Projection;
 use cullmark::record::SceneSource;
@@ -16,6 +19,7 @@ fn sweep() -> Sweep {
         x: "scene.offset_m".into(),
         x_unit: "m".into(),
         y: "false_cull_ppm".into(),
+        against: None,
         by: "arithmetic".into(),
         x_log: true,
         y_log: true,

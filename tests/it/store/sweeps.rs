@@ -11,6 +11,7 @@ fn sweep() -> Sweep {
         x: "scene.offset_m".into(),
         x_unit: "m".into(),
         y: "false_culls".into(),
+        against: None,
         by: "arithmetic".into(),
         x_log: true,
         y_log: true,
