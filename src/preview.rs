@@ -2,6 +2,7 @@
 //! shadows, flat shading, stable colours a material. For pictures only: nothing
 //! here judges or measures anything (the oracle has its own, exact, buffers).
 
+mod depth;
 mod palette;
 mod raster;
 mod views;
@@ -14,6 +15,7 @@ use raster::{BACK_BIT, Buffers, NONE, rasterise, unproject};
 use rayon::prelude::*;
 use std::path::Path;
 
+pub use depth::depth;
 pub use views::{draw_line, overview, plan};
 
 /// 8-bit RGBA, rows from the top.
@@ -192,14 +194,27 @@ impl Sun {
 /// When the file cannot be written; the message names it.
 pub fn write_png(path: &Path, image: &Image) -> Result<()> {
     let file = std::fs::File::create(path).map_err(|e| Error::io(path, "cannot create the image", &e))?;
-    let mut encoder = png::Encoder::new(std::io::BufWriter::new(file), image.width, image.height);
-    encoder.set_color(png::ColorType::Rgba);
-    encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header().map_err(|e| fault(path, &e))?;
-    writer.write_image_data(&image.rgba).map_err(|e| fault(path, &e))?;
-    writer.finish().map_err(|e| fault(path, &e))
+    encode(std::io::BufWriter::new(file), image).map_err(|e| e.in_file(path).help("is the disk full?"))
 }
 
-fn fault(path: &Path, e: &png::EncodingError) -> Error {
-    Error::new(format!("cannot write the image: {e}")).in_file(path).help("is the disk full?")
+/// The image as the bytes of a PNG file.
+///
+/// # Errors
+/// When it has no pixels.
+pub fn encode_png(image: &Image) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    encode(&mut bytes, image)?;
+    Ok(bytes)
+}
+
+fn encode(to: impl std::io::Write, image: &Image) -> Result<()> {
+    let write = || {
+        let mut encoder = png::Encoder::new(to, image.width, image.height);
+        encoder.set_color(png::ColorType::Rgba);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&image.rgba)?;
+        writer.finish()
+    };
+    write().map_err(|e: png::EncodingError| Error::new(format!("cannot write the image: {e}")))
 }

@@ -25,6 +25,7 @@ use crate::culling::{DrawList, TESTS, Tally};
 use crate::error::{Error, Result};
 use crate::math::Camera;
 use crate::oracle::losses;
+use crate::preview::{depth, encode_png};
 use crate::record::{RunSpec, SceneSpec};
 use crate::registry::{Spec, find};
 use crate::runner::{Setup, submitted};
@@ -50,6 +51,8 @@ pub struct RunView {
     list: DrawList,
     shown: Option<usize>,
     truth: TruthOf,
+    /// The walk has a depth buffer to show.
+    depth: bool,
     /// Finished frames with truth, the last used at the end.
     kept: VecDeque<(usize, Vec<u8>)>,
 }
@@ -70,6 +73,7 @@ impl RunView {
         RunView {
             numbers: Numbers::of(&setup.hierarchy),
             truth: TruthOf::new(spec, setup.views.len(), cache),
+            depth: setup.walk.buffer().is_some(),
             spec: spec.clone(),
             setup,
             watch,
@@ -86,6 +90,7 @@ impl RunView {
         about.poses = self.setup.views.iter().map(|v| about::pose(v, self.setup.scene.origin)).collect();
         about.tests = self.spec.culling.iter().map(test_name).collect();
         about.judged = self.truth.judged().to_vec();
+        about.depth = self.depth;
         about
     }
 
@@ -104,12 +109,7 @@ impl RunView {
     /// # Errors
     /// When the path has no frame `n`.
     pub fn frame(&mut self, n: usize, truth: bool) -> Result<Vec<u8>> {
-        let frames = self.setup.views.len();
-        if n >= frames {
-            return Err(Error::new(format!("frame {n} is not one of the path's {frames}"))
-                .key("frame")
-                .help(format!("ask for a frame from 0 to {}", frames - 1)));
-        }
+        self.check(n)?;
         if truth && let Some(at) = self.kept.iter().position(|(frame, _)| *frame == n) {
             let ready = self.kept.remove(at).expect("just found");
             self.kept.push_back(ready.clone());
@@ -146,6 +146,34 @@ impl RunView {
         }
         self.kept.push_back((n, bytes.clone()));
         Ok(bytes)
+    }
+
+    /// What hides in frame `n`, as a PNG of the walk's depth buffer.
+    ///
+    /// # Errors
+    /// When the path has no frame `n`, or the walk has no such buffer.
+    pub fn depth(&mut self, n: usize) -> Result<Vec<u8>> {
+        self.check(n)?;
+        if self.depth {
+            self.go_to(n);
+        }
+        let buffer = self.setup.walk.buffer().ok_or_else(|| {
+            Error::new("this walk draws no occluders, so there is no depth to show")
+                .key("ask")
+                .help("look at a run whose walk queries occlusion, such as `chc_pp`")
+        })?;
+        let size = buffer.settings();
+        encode_png(&depth(size.width_px, size.height_px, &buffer.image()))
+    }
+
+    fn check(&self, n: usize) -> Result<()> {
+        let frames = self.setup.views.len();
+        if n < frames {
+            return Ok(());
+        }
+        Err(Error::new(format!("frame {n} is not one of the path's {frames}"))
+            .key("frame")
+            .help(format!("ask for a frame from 0 to {}", frames - 1)))
     }
 
     /// Culls frame `n` in the state that a pass has there. Tests learn nothing that

@@ -76,6 +76,7 @@ fn routes() -> OpenApiRouter<Shared> {
         .routes(routes!(views::mesh))
         .routes(routes!(views::nodes))
         .routes(routes!(views::frame))
+        .routes(routes!(views::depth))
         .routes(routes!(views::upload_about))
         .routes(routes!(views::upload_mesh))
         .routes(routes!(server::me))

@@ -268,9 +268,12 @@ async fn respond(app: &Shared, key: &str, subject: Subject, request: Value, head
     if caching::fresh(headers, &tag) {
         return Ok(caching::not_modified(&tag));
     }
-    let about = request["ask"] == "about";
+    let kind = match request["ask"].as_str() {
+        Some("about") => "application/json",
+        Some("depth") => "image/png",
+        _ => "application/octet-stream",
+    };
     let bytes = Views::ask(app, key, subject, request).await?;
-    let kind = if about { "application/json" } else { "application/octet-stream" };
     Ok(caching::tagged(([(header::CONTENT_TYPE, kind)], bytes).into_response(), &tag))
 }
 
@@ -334,6 +337,19 @@ pub async fn frame(
     headers: HeaderMap,
 ) -> Answer<Response> {
     of_run(&app, &study, &run, json!({ "ask": "frame", "frame": frame, "truth": q.truth }), &headers).await
+}
+
+/// What the walk's depth buffer holds after a frame (PNG)
+#[utoipa::path(get, path = "/studies/{study}/runs/{run}/view/frames/{frame}/depth", tag = "frames", operation_id = "view_depth",
+    params(("study" = String, Path, description = "name or name@series"), ("run" = String, Path, description = "ordinal or measurement_id"), ("frame" = u32, Path, description = "from 0")),
+    responses((status = 200, body = Vec<u8>, content_type = "image/png"), (status = 304), Problem))]
+pub async fn depth(
+    State(app): State<Shared>,
+    _: Reader,
+    Path((study, run, frame)): Path<(String, String, u32)>,
+    headers: HeaderMap,
+) -> Answer<Response> {
+    of_run(&app, &study, &run, json!({ "ask": "depth", "frame": frame }), &headers).await
 }
 
 /// An uploaded scene to look at

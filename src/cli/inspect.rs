@@ -14,6 +14,7 @@ use crate::manifest::axes;
 use crate::math::Arithmetic;
 use crate::oracle::image::Grid;
 use crate::oracle::{Effort, FrameTruth, losses, observed_class, verdict};
+use crate::preview::{self, write_png};
 use crate::record::Accuracy;
 use crate::registry::{Spec, parse_sum};
 use crate::runner::{Setup, submitted};
@@ -42,7 +43,7 @@ pub struct Args {
     /// Sum of culling tests, such as `frustum+normal_mask`
     #[arg(long, value_name = "SUM", default_value = "none")]
     culling: String,
-    /// Order of visit: auto, flat or depth_first
+    /// Order of visit: auto, or a walk such as depth_first or chc_pp:batch=50
     #[arg(long, value_name = "SPEC", default_value = "auto")]
     walk: String,
     /// Numbers in which tests are evaluated that state none
@@ -71,6 +72,9 @@ pub struct Args {
     /// Picture of the frame beside a plan: submitted triangles blue, lost ones red, the rest pale on the plan
     #[arg(long, value_name = "FILE.png")]
     image: Option<PathBuf>,
+    /// Picture of the walk's depth buffer after the frame: near is bright, blue is nothing
+    #[arg(long, value_name = "FILE.png")]
+    depth: Option<PathBuf>,
     /// Print one JSON document instead of text
     #[arg(long)]
     json: bool,
@@ -116,6 +120,16 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(file) = &args.dump_submitted {
         let ids: Vec<u32> = sent.triangles.iter().map(|t| setup.scene.source_triangle_id[t as usize]).collect();
         write_ids(file, &ids)?;
+    }
+    if let Some(file) = &args.depth {
+        let walk = &method.walk;
+        let buffer = setup.walk.buffer().ok_or_else(|| {
+            Error::new(format!("asks for a depth buffer, but `{walk}` draws no occluders"))
+                .key("--depth")
+                .help("leave it out, or choose a walk that queries occlusion, such as --walk chc_pp")
+        })?;
+        let size = buffer.settings();
+        write_png(file, &preview::depth(size.width_px, size.height_px, &buffer.image()))?;
     }
     if let Some(file) = &args.image {
         picture::write(file, &setup.scene, &view, &sent.triangles, &losses)?;

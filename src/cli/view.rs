@@ -4,7 +4,7 @@
 //! One JSON document a line in on standard input: first what to open ([`Open`]), then
 //! what to show ([`Request`]). Every reply is the line `{"bytes": N}` and N raw bytes,
 //! or the line `{"error": {"message", "help"}}`; the one to the opening has 0 bytes.
-//! `about` is JSON, the rest are the forms of [`crate::viewing::forms`]. A mistaken
+//! `about` is JSON, `depth` a PNG, the rest are the forms of [`crate::viewing::forms`]. A mistaken
 //! request ends nothing; a mistaken opening does, with exit code 1.
 
 use super::pipe;
@@ -43,7 +43,7 @@ pub struct Request {
     pub truth: bool,
 }
 
-const ASKS: [&str; 4] = ["about", "mesh", "nodes", "frame"];
+const ASKS: [&str; 5] = ["about", "mesh", "nodes", "frame", "depth"];
 
 enum Viewed {
     Run(Box<RunView>),
@@ -125,16 +125,13 @@ fn show(viewed: &mut Viewed, request: &Request) -> Result<Vec<u8>> {
         ("mesh", Viewed::Run(run)) => Ok(run.mesh()),
         ("mesh", Viewed::Scene(scene)) => Ok(scene.mesh()),
         ("nodes", Viewed::Run(run)) => Ok(run.nodes()),
-        ("frame", Viewed::Run(run)) => {
-            let n = request.frame.ok_or_else(|| {
-                Error::new("is missing").key("frame").help("say which frame of the path to show, from 0")
-            })?;
-            // A number that no index can hold is beyond every path too.
-            run.frame(usize::try_from(n).unwrap_or(usize::MAX), request.truth)
+        ("frame", Viewed::Run(run)) => run.frame(wanted(request)?, request.truth),
+        ("depth", Viewed::Run(run)) => run.depth(wanted(request)?),
+        (ask @ ("nodes" | "frame" | "depth"), Viewed::Scene(_)) => {
+            Err(Error::new(format!("a scene alone has no {ask} to show"))
+                .key("ask")
+                .help("open a run, or ask for `about` or `mesh`"))
         }
-        (ask @ ("nodes" | "frame"), Viewed::Scene(_)) => Err(Error::new(format!("a scene alone has no {ask} to show"))
-            .key("ask")
-            .help("open a run, or ask for `about` or `mesh`")),
         (other, _) => {
             Err(Error::new(format!("`{other}` cannot be shown")).key("ask").help(match did_you_mean(other, ASKS) {
                 Some(near) => format!("did you mean `{near}`?"),
@@ -142,6 +139,12 @@ fn show(viewed: &mut Viewed, request: &Request) -> Result<Vec<u8>> {
             }))
         }
     }
+}
+
+fn wanted(request: &Request) -> Result<usize> {
+    let missing = || Error::new("is missing").key("frame").help("say which frame of the path to show, from 0");
+    // A number that no index can hold is beyond every path too.
+    request.frame.map(|n| usize::try_from(n).unwrap_or(usize::MAX)).ok_or_else(missing)
 }
 
 fn json(about: &About) -> Result<Vec<u8>> {

@@ -60,6 +60,7 @@ pub use draw_list::DrawList;
 use crate::error::{Error, Result};
 use crate::hierarchy::Hierarchy;
 use crate::math::{Arithmetic, View, arithmetic};
+use crate::raster::DepthBuffer;
 use crate::registry::{Default as Allowed, Entry, Param, Spec, Value, find};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -216,6 +217,10 @@ pub trait Walk: Send {
     /// Forgets earlier frames, as [`Test::reset`].
     fn reset(&mut self) {
         self.skipping().into_iter().for_each(Skipping::reset);
+    }
+    /// Its depth of occluders, if it has one; after a frame as that frame left it. For pictures.
+    fn buffer(&mut self) -> Option<&mut DepthBuffer> {
+        None
     }
     /// Whether earlier frames of the pass may change what is submitted. If not, any
     /// frame can be culled by itself.

@@ -24,6 +24,9 @@ pub struct About {
     pub tests: Vec<String>,
     /// Frames that the run's judgement looks at.
     pub judged: Vec<u32>,
+    /// Whether the walk has a depth buffer to show.
+    #[serde(default)]
+    pub depth: bool,
     /// How the scene's file is placed in the world (turned, scaled, moved, in this
     /// order), so that a recorded path can be written in the file's own axes and units.
     pub up: Up,
@@ -58,6 +61,7 @@ impl About {
             poses: Vec::new(),
             tests: Vec::new(),
             judged: Vec::new(),
+            depth: false,
             up: spec.up,
             scale: spec.scale,
             offset_m: spec.offset_m,

@@ -2,6 +2,7 @@
 // uploaded scene to fly through. `mount` puts it into an element of a page; loading goes
 // on behind, and what fails is said in the element.
 
+import { DepthPicture } from "./depth.js";
 import { el, explain, number, save } from "./dom.js";
 import { LOST, NOT_SUBMITTED, parseFrame, parseMesh, parseNodes, SEEN, UNSEEN } from "./formats.js";
 import { FrameStore } from "./frames.js";
@@ -126,6 +127,11 @@ class Viewer {
         this.nodePanel = nodeSection(nodes, view.tests ?? [], this.look, { changed, boxes: () => this.boxes() });
         side.append(this.nodePanel.node);
       }
+      if (view.depth) {
+        const load = (n, signal) => this.api.binary(`${this.paths.view}/frames/${n}/depth`, { signal });
+        this.depth = new DepthPicture(this.stage.leftPane, load);
+        side.append(this.depth.node);
+      }
       this.timeline = new Timeline(this.frames, view.judged ?? [], {
         go: (n) => this.go(n),
         play: (playing) => this.play(playing),
@@ -211,6 +217,7 @@ class Viewer {
     const start = performance.now();
     const { stage } = this;
     this.shown = n;
+    this.depth?.show(n);
     this.frame = frame;
     stage.setMeasured(n);
     stage.renderer.setFrame(frame);
@@ -365,6 +372,7 @@ class Viewer {
     clearTimeout(this.spoken);
     this.store?.destroy();
     this.timeline?.destroy();
+    this.depth?.destroy();
     this.unwatch?.();
     this.stage?.destroy();
     this.root.remove();
