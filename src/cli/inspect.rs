@@ -1,9 +1,11 @@
 //! `cullmark inspect`: one frame of one method: its work, its errors, what it
 //! submitted as a list of ids and as a picture.
 
+mod nodes;
 mod picture;
 mod text;
 
+use nodes::Nodes;
 use text::Report;
 
 use super::camera::CameraOptions;
@@ -20,6 +22,7 @@ use crate::registry::{Spec, parse_sum};
 use crate::runner::{Setup, submitted};
 use crate::scene::{load, walkthrough};
 use crate::structure;
+use crate::viewing::watch::Watch;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -69,7 +72,8 @@ pub struct Args {
     /// Write the submitted source triangle ids: one a line, ascending, each once, from 0
     #[arg(long, value_name = "FILE")]
     dump_submitted: Option<PathBuf>,
-    /// Picture of the frame beside a plan: submitted triangles blue, lost ones red, the rest pale on the plan
+    /// Picture of the frame beside a plan: submitted triangles blue, lost ones red, the rest pale on the plan,
+    /// nodes that the walk found hidden framed in orange
     #[arg(long, value_name = "FILE.png")]
     image: Option<PathBuf>,
     /// Picture of the walk's depth buffer after the frame: near is bright, blue is nothing
@@ -100,12 +104,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (walk, _) = culling::make_walk(&method.walk)?;
     let mut setup = Setup::from_parts(scene, poses, &camera, structure.as_ref(), tests, walk)?;
 
+    let watch = Watch::over(&mut setup.tests);
     setup.reset();
     let (mut list, mut tally) = (DrawList::default(), Tally::default());
     for frame in 0..=args.frame as usize {
         tally = Tally::default();
+        watch.clear();
         setup.cull(frame, &mut list, &mut tally);
     }
+    let nodes = Nodes::of(&setup, &watch, &list);
     let view = setup.views[args.frame as usize].clone();
     let height_px = args.height.unwrap_or_else(|| (f64::from(args.width) / args.camera.aspect).round().max(1.0) as u32);
     let grid = Grid { width_px: args.width, height_px, samples: args.samples };
@@ -132,7 +139,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         write_png(file, &preview::depth(size.width_px, size.height_px, &buffer.image()))?;
     }
     if let Some(file) = &args.image {
-        picture::write(file, &setup.scene, &view, &sent.triangles, &losses)?;
+        picture::write(file, &setup.scene, &view, &sent.triangles, &losses, &nodes.hidden_boxes)?;
     }
     let report = Report {
         scene: &scene_spec,
@@ -142,6 +149,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         view: &view,
         list: &list,
         tally,
+        nodes: &nodes,
         truth: &truth,
         losses: &losses,
         wrong: wrong.as_deref(),

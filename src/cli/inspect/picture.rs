@@ -13,11 +13,19 @@ const GAP: u32 = 8;
 const LOST: [u8; 3] = [226, 28, 28];
 /// Not the colours of materials: some of those are red.
 const SUBMITTED: [u8; 3] = [118, 156, 196];
+const HIDDEN: [u8; 3] = [214, 130, 20];
 const OUTLINE: [u8; 3] = [24, 32, 72];
 
 /// Submitted triangles blue, lost ones red; on the plan what was
-/// not submitted is pale.
-pub fn write(file: &Path, scene: &Scene, view: &View, submitted: &BitSet, losses: &Losses) -> Result<()> {
+/// not submitted is pale, and boxes of hidden nodes are framed.
+pub fn write(
+    file: &Path,
+    scene: &Scene,
+    view: &View,
+    submitted: &BitSet,
+    losses: &Losses,
+    hidden: &[Aabb],
+) -> Result<()> {
     let mut lost = BitSet::new(scene.len());
     losses.seen.iter().chain(&losses.hidden).for_each(|t| lost.insert(*t));
     let look = |t: u32, rest: Look| {
@@ -41,6 +49,17 @@ pub fn write(file: &Path, scene: &Scene, view: &View, submitted: &BitSet, losses
     let cut_above_m = (view.eye.z + 1.0 < bounds.hi.z).then_some(view.eye.z + 1.0);
     let style = Style { shadows: false, look: Some(&plan_look), cut_above_m, ..Style::default() };
     let mut right = render(scene, &above, HEIGHT, HEIGHT, &style);
+    for b in hidden {
+        let corner = |x: f64, y: f64| level(DVec3::new(x, y, 0.0), &bounds);
+        let ring = [
+            corner(b.lo.x, b.lo.y),
+            corner(b.hi.x, b.lo.y),
+            corner(b.hi.x, b.hi.y),
+            corner(b.lo.x, b.hi.y),
+            corner(b.lo.x, b.lo.y),
+        ];
+        draw_line(&mut right, &above, &ring, HIDDEN);
+    }
     outline(&mut right, &above, view, &bounds);
     write_png(file, &beside(&left, &right))
 }

@@ -1,6 +1,7 @@
 //! What `inspect` prints of a frame: lines for people, one document for programs.
 
 use super::Method;
+use super::nodes::Nodes;
 use crate::culling::{Class, DrawList, Removes, Tally};
 use crate::math::{Pose, View};
 use crate::oracle::{Effort, FrameTruth, Losses};
@@ -17,6 +18,7 @@ pub struct Report<'a> {
     pub view: &'a View,
     pub list: &'a DrawList,
     pub tally: Tally,
+    pub nodes: &'a Nodes,
     pub truth: &'a FrameTruth,
     pub losses: &'a Losses,
     pub wrong: Option<&'a str>,
@@ -66,8 +68,19 @@ impl Report<'_> {
                 group(calls_any)
             ),
         ];
-        let work = self.tally.named().map(|(name, _, value)| format!("{} {}", group(value), name.replace('_', " ")));
-        lines.push(format!("work       {}", work.join(", ")));
+        let done = self.tally.named().into_iter().filter(|(_, _, value)| *value != 0);
+        let work: Vec<String> =
+            done.map(|(name, _, value)| format!("{} {}", group(value), name.replace('_', " "))).collect();
+        lines.push(format!("work       {}", if work.is_empty() { "none".into() } else { work.join(", ") }));
+        let nodes = self.nodes;
+        lines.push(format!(
+            "nodes      {} drawn, {} entered, {} outside, {} hidden, {} not reached",
+            group(nodes.drawn),
+            group(nodes.entered),
+            group(nodes.outside),
+            group(nodes.hidden),
+            group(nodes.not_reached)
+        ));
         lines.push(format!("owed       {} triangles {}", group(e.potential), owed(self.setup.removes)));
         let grid = self.truth.grid;
         lines.push(format!(
@@ -169,6 +182,13 @@ impl Report<'_> {
             "draw_calls": calls,
             "draw_calls_any_material": calls_any,
             "counters": counters,
+            "nodes": {
+                "drawn": self.nodes.drawn,
+                "entered": self.nodes.entered,
+                "outside": self.nodes.outside,
+                "hidden": self.nodes.hidden,
+                "not_reached": self.nodes.not_reached,
+            },
             "samples": self.truth.grid.samples,
             "uncertain_triangles": self.truth.uncertain,
             "witness_rays": self.effort.witness_rays,
