@@ -210,7 +210,7 @@ pub trait Walk: Send {
         Removes::default()
     }
     /// The samples at which a sample-conservative walk promises to lose nothing; truth for
-    /// its verdict is taken there. Columns and rows.
+    /// its verdict is taken there.
     fn samples(&self) -> Option<(u32, u32)> {
         None
     }
