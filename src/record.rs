@@ -259,11 +259,16 @@ impl RunSpec {
 
     /// Truth is shared by all methods on the same scene, path and camera.
     pub fn truth_id(&self) -> String {
+        self.truth_id_at(&self.accuracy)
+    }
+
+    /// The same at another accuracy than the one asked for.
+    pub fn truth_id_at(&self, accuracy: &Accuracy) -> String {
         hash_json(&(
             &self.scene.fingerprint,
             (&self.path.fingerprint, self.path.frames, self.path.stride),
             &self.camera,
-            &self.accuracy,
+            accuracy,
         ))
     }
 

@@ -5,16 +5,18 @@
 //! submitted ranges. No clock is read inside an algorithm: the clock brackets
 //! one frame's `begin` + walk, and nothing else.
 
+mod judging;
+
 use crate::culling::distinct::Distinct;
 use crate::culling::{self, Class, DrawList, Removes, Tally, Test, Walk};
 use crate::error::{Error, Result};
 use crate::hierarchy::Hierarchy;
 use crate::machine;
 use crate::math::{Camera, Pose, View};
-use crate::oracle;
-use crate::record::{Accuracy, Counter, FrameErrors, Judgement, RunSpec, Sentinel, Series, TrialRecord};
+use crate::record::{Counter, RunSpec, Sentinel, Series, TrialRecord};
 use crate::scene::{Scene, load, walkthrough};
 use crate::structure::{self, Structure};
+pub use judging::{judge, judge_setup, submitted};
 use std::path::Path;
 use std::time::Instant;
 
@@ -144,28 +146,6 @@ impl Setup {
                 }
             })
             .collect()
-    }
-
-    /// The frames that `accuracy` asks to judge, with their poses.
-    pub fn judged_poses(&self, accuracy: &Accuracy) -> Vec<(u32, Pose)> {
-        let judged = oracle::judged_frames(self.views.len() as u32, accuracy);
-        judged.iter().map(|f| (*f, self.poses[*f as usize])).collect()
-    }
-
-    /// Compares the submitted sets with the truth at the frames that it holds.
-    pub fn judge(&mut self, truth: &oracle::Truth) -> Judgement {
-        let mut frames: Vec<FrameErrors> = Vec::new();
-        let removes = self.removes;
-        let work = self.count_pass(|setup, frame, list| {
-            if let Some(t) = truth.frames.iter().find(|t| t.frame as usize == frame) {
-                let submitted = submitted(&setup.scene, &setup.hierarchy, list);
-                let mut errors = oracle::judge_frame(&setup.scene, &setup.views[frame], t, &submitted, removes);
-                errors.submitted_entries = list.entry_count();
-                frames.push(errors);
-            }
-        });
-        let wrong = oracle::verdict(self.class, &frames);
-        Judgement { class: self.class, removes, wrong, frames, frames_hash: self.frames_hash(&work) }
     }
 
     /// After a pass: an error if some test calls it void.
@@ -309,45 +289,6 @@ fn record(
 
 fn sum(series: &Series) -> Counter {
     Counter { name: series.name.clone(), unit: series.unit.clone(), value: series.values.iter().sum() }
-}
-
-/// Judges the answer of `spec` against the truth at sampled frames.
-///
-/// # Errors
-/// As [`Setup::new`], or when a test calls its pass void. An answer that is wrong
-/// for its class is not an error but a judgement with `wrong` set.
-pub fn judge(spec: &RunSpec, cache: &Path) -> Result<Judgement> {
-    if let Some(core) = spec.protocol.pin_core {
-        let others = machine::auxiliary_cores(Some(core));
-        if !others.is_empty() {
-            machine::pin_to(&others)?;
-        }
-    }
-    let mut setup = Setup::new(spec, cache)?;
-    let poses = setup.judged_poses(&spec.accuracy);
-    let truth = oracle::truth_cached(&setup.scene, &spec.camera, &poses, &spec.accuracy, cache, &spec.truth_id())?;
-    let judgement = setup.judge(&truth);
-    setup.check()?;
-    Ok(judgement)
-}
-
-/// The submitted set in the oracle's terms, which know no hierarchy.
-pub fn submitted(scene: &Scene, hierarchy: &Hierarchy, list: &DrawList) -> oracle::Submitted {
-    let mut out = oracle::Submitted::none(scene.len());
-    let mut drawn = vec![false; hierarchy.entries.len()];
-    for position in list.positions() {
-        drawn[position as usize] = true;
-        out.triangles.insert(hierarchy.entries[position as usize]);
-    }
-    if let Some(fragments) = &hierarchy.fragments {
-        // A triangle of which a part was submitted may still miss another part.
-        for (position, triangle) in hierarchy.entries.iter().enumerate() {
-            if !drawn[position] && out.triangles.contains(*triangle) {
-                out.lost_pieces.push((*triangle, fragments[position]));
-            }
-        }
-    }
-    out
 }
 
 /// A fast order-dependent mix of the ranges; collisions would need 2^32 frames to be likely.

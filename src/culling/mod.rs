@@ -210,6 +210,11 @@ pub trait Walk: Send {
     fn removes(&self) -> Removes {
         Removes::default()
     }
+    /// The samples at which a sample-conservative walk promises to lose nothing; truth for
+    /// its verdict is taken there.
+    fn samples(&self) -> Option<(u32, u32)> {
+        None
+    }
     /// What lets it skip whole frames, if it has that.
     fn skipping(&mut self) -> Option<&mut Skipping> {
         None

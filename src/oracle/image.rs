@@ -3,6 +3,7 @@
 //! A tile is a square of whole pixels, about 64 samples wide, so that an image
 //! of any resolution is made, stored and read one small piece at a time.
 
+use crate::record::Accuracy;
 use serde::{Deserialize, Serialize};
 
 /// Nothing was hit.
@@ -40,6 +41,11 @@ impl TileRect {
 }
 
 impl Grid {
+    /// The samples that `accuracy` asks for.
+    pub fn of(accuracy: &Accuracy) -> Grid {
+        Grid { width_px: accuracy.width_px, height_px: accuracy.height_px, samples: accuracy.samples }
+    }
+
     pub fn columns(&self) -> u32 {
         self.width_px * self.samples
     }

@@ -191,7 +191,7 @@ fn count_samples(triangles: usize, grid: Grid, tiles: &[TileRuns]) -> (Vec<u32>,
 
 /// Truth of `poses` (frame number and pose). Frames run in parallel.
 pub fn truth(scene: &Scene, camera: &Camera, poses: &[(u32, Pose)], accuracy: &Accuracy) -> Truth {
-    let grid = Grid { width_px: accuracy.width_px, height_px: accuracy.height_px, samples: accuracy.samples };
+    let grid = Grid::of(accuracy);
     let effort = Effort::new(scene, accuracy);
     let frames =
         poses.par_iter().map(|(frame, pose)| FrameTruth::with(scene, &View::new(camera, pose), *frame, grid, &effort));

@@ -52,7 +52,6 @@ impl TruthOf {
         }
         let accuracy = &self.spec.accuracy;
         let effort = self.effort.get_or_insert_with(|| Effort::new(scene, accuracy));
-        let grid = Grid { width_px: accuracy.width_px, height_px: accuracy.height_px, samples: accuracy.samples };
-        FrameTruth::with(scene, view, frame, grid, effort)
+        FrameTruth::with(scene, view, frame, Grid::of(accuracy), effort)
     }
 }

@@ -11,6 +11,8 @@ mod inspect;
 mod judgement;
 mod mutations;
 mod pairs;
+mod pvs;
+mod samples;
 mod ties;
 
 use crate::common::soup;

@@ -2,10 +2,11 @@
 
 use super::{accuracy, cameras};
 use crate::common::{shared, soup};
-use cullmark::culling::{Class, make_tests, make_walk};
+use cullmark::culling::{Class, WALKS, make_tests, make_walk};
 use cullmark::hierarchy::Hierarchy;
 use cullmark::math::{Camera, DVec3, Pose};
-use cullmark::oracle::{judged_frames, truth};
+use cullmark::oracle::image::Grid;
+use cullmark::oracle::{Truth, judged_frames, truth};
 use cullmark::record::{Accuracy, FrameErrors, PathSource, PathSpec, SceneSource, Up, Winding};
 use cullmark::registry::{Spec, parse_sum};
 use cullmark::runner::Setup;
@@ -79,10 +80,24 @@ const SKIPPING: [&str; 4] =
 const SKIPPED: [&str; 4] =
     ["frustum+normal_mask", "frustum:octant=true+back_face:arithmetic=filtered", "look_at", "frustum+mailbox"];
 
-/// Every culling with every walk over the structure, then the skipping ones.
+/// What walks that leave out what is hidden are judged with: their queries are the work, and
+/// the tests before them matter little.
+const BEFORE_HIDING: [&str; 3] = ["none", "frustum", "frustum+back_face:arithmetic=filtered"];
+
+/// Every culling with every walk over the structure, then the skipping ones, then those
+/// that leave out what is hidden, as the registry has them.
 fn methods(structure: &str) -> Vec<(&'static str, &'static str)> {
     let all = CULLINGS.into_iter().flat_map(|c| walks(structure).iter().map(move |w| (c, *w)));
-    all.chain(SKIPPED.into_iter().flat_map(|c| SKIPPING.map(|w| (c, w)))).collect()
+    let skipping = SKIPPED.into_iter().flat_map(|c| SKIPPING.map(|w| (c, w)));
+    let hiding = hiding_walks().into_iter().flat_map(|w| BEFORE_HIDING.map(|c| (c, w)));
+    all.chain(skipping).chain(hiding).collect()
+}
+
+/// Walks entitled to leave out what is hidden, with their defaults, but for `portals`,
+/// which one structure alone serves and the cross has already.
+fn hiding_walks() -> Vec<&'static str> {
+    let hides = |name: &str| make_walk(&Spec::new(name)).unwrap().0.removes().occluded;
+    WALKS.iter().map(|w| w.name).filter(|w| *w != "portals" && hides(w)).collect()
 }
 
 fn generated(spec: &str) -> Scene {
@@ -117,22 +132,42 @@ fn walks(structure: &str) -> &'static [&'static str] {
     if structure.starts_with("portal_octree") { all } else { &all[..2] }
 }
 
-/// Judges every pair over `poses`; returns how many were judged. Truth is shared.
+/// Judges every pair over `poses`; returns how many were judged or refused. Truth is shared.
 fn all_pairs_face_the_oracle(scene: &Scene, camera: &Camera, poses: &[Pose], accuracy: &Accuracy) -> usize {
     let numbered: Vec<(u32, Pose)> = (0u32..).zip(poses.iter().copied()).collect();
-    let truth = truth(scene, camera, &numbered, accuracy);
+    let truth_of = |accuracy: &Accuracy| truth(scene, camera, &numbered, accuracy);
+    let truth = truth_of(accuracy);
     let seen: usize = truth.frames.iter().map(|f| f.visible.len()).sum();
     assert!(seen > 20 * poses.len(), "{} shows next to nothing", scene.name);
+    // Of walks with samples of their own: one truth for all with the same.
+    let mut at_own: Vec<Truth> = Vec::new();
+    for (width_px, height_px) in hiding_walks().iter().filter_map(|w| make_walk(&Spec::new(w)).unwrap().0.samples()) {
+        let own = Accuracy { width_px, height_px, samples: 1, ..accuracy.clone() };
+        if at_own.iter().all(|t| t.frames[0].grid != Grid::of(&own)) {
+            at_own.push(truth_of(&own));
+        }
+    }
     let judged = |structure: &String| -> usize {
         let made = cullmark::structure::make(&Spec::parse(structure).unwrap()).unwrap().0;
         let built = Built(made.build(scene).unwrap());
-        let mut judged = 0;
+        let (mut judged, mut refused) = (0, 0);
         for (culling, walk) in methods(structure) {
             let tests = make_tests(&parse_sum(culling).unwrap()).unwrap().0;
             let walk_made = make_walk(&Spec::parse(walk).unwrap()).unwrap().0;
-            let parts = Setup::from_parts(scene.clone(), poses.to_vec(), camera, &built, tests, walk_made);
-            let judgement = parts.unwrap().judge(&truth);
             let method = format!("{} {structure} {culling} {walk}", scene.name);
+            if let Some(why) = walk_made.refuses(&built.0) {
+                // A structure may lack what such a walk needs, but never a tree of boxes.
+                assert!(walk_made.removes().occluded && !structure.starts_with("bvh"), "{method}: {why}");
+                refused += 1;
+                continue;
+            }
+            judged += 1;
+            let parts = Setup::from_parts(scene.clone(), poses.to_vec(), camera, &built, tests, walk_made);
+            let mut setup = parts.unwrap();
+            let own = setup.promised_at(Grid::of(accuracy)).map(|own| {
+                at_own.iter().find(|t| t.frames[0].grid == Grid::of(&own)).expect("a truth for all samples")
+            });
+            let judgement = setup.judge_by(&truth, own);
             assert_eq!(judgement.wrong, None, "{method}");
             let sum = |of: fn(&FrameErrors) -> u64| judgement.frames.iter().map(of).sum::<u64>();
             assert_eq!(judgement.frames.len(), poses.len());
@@ -147,9 +182,8 @@ fn all_pairs_face_the_oracle(scene: &Scene, camera: &Camera, poses: &[Pose], acc
                     sum(|f| f.covered_pixels)
                 );
             }
-            judged += 1;
         }
-        judged
+        judged + refused
     };
     use rayon::prelude::*;
     structures().par_iter().map(judged).sum()
