@@ -3,6 +3,7 @@
 //! them; neither knows any structure.
 
 pub mod back_face;
+pub mod chc;
 pub mod depth_first;
 mod descent;
 pub mod distinct;
@@ -39,6 +40,7 @@ pub mod frustum_world;
 pub mod frustum_x86;
 pub mod look_at;
 pub mod mailbox;
+pub mod nested_query;
 pub mod normal_cone;
 pub mod normal_mask;
 mod normal_mask_local;
@@ -47,6 +49,7 @@ pub mod portals;
 pub mod portals_screen;
 #[cfg(target_arch = "x86_64")]
 mod prefetch_x86;
+pub mod queries;
 mod saturation;
 pub mod sector;
 #[cfg(target_arch = "x86_64")]
@@ -209,6 +212,11 @@ pub trait Walk: Send {
     fn removes(&self) -> Removes {
         Removes::default()
     }
+    /// The samples at which a sample-conservative walk promises to lose nothing; truth for
+    /// its verdict is taken there.
+    fn samples(&self) -> Option<(u32, u32)> {
+        None
+    }
     /// What lets it skip whole frames, if it has that.
     fn skipping(&mut self) -> Option<&mut Skipping> {
         None
@@ -246,7 +254,8 @@ pub static TESTS: &[Entry<dyn Test>] = &[
 ];
 
 /// Sorted by name.
-pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, flat::ENTRY, portals::ENTRY];
+pub static WALKS: &[Entry<dyn Walk>] =
+    &[chc::ENTRY, depth_first::ENTRY, flat::ENTRY, nested_query::ENTRY, portals::ENTRY];
 
 /// The parts of a sum, made, and their resolved specs.
 pub type Sum = (Vec<Box<dyn Test>>, Vec<Spec>);
