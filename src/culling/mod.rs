@@ -4,6 +4,7 @@
 
 pub mod back_face;
 pub mod chc;
+pub mod chc_pp;
 pub mod depth_first;
 mod descent;
 pub mod distinct;
@@ -255,7 +256,7 @@ pub static TESTS: &[Entry<dyn Test>] = &[
 
 /// Sorted by name.
 pub static WALKS: &[Entry<dyn Walk>] =
-    &[chc::ENTRY, depth_first::ENTRY, flat::ENTRY, nested_query::ENTRY, portals::ENTRY];
+    &[chc::ENTRY, chc_pp::ENTRY, depth_first::ENTRY, flat::ENTRY, nested_query::ENTRY, portals::ENTRY];
 
 /// The parts of a sum, made, and their resolved specs.
 pub type Sum = (Vec<Box<dyn Test>>, Vec<Spec>);

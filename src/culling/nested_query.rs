@@ -32,11 +32,8 @@ pub const ENTRY: Entry<dyn Walk> = Entry {
         STILL,
         WHOLE_BELOW,
     ],
-    make: |spec| Box::new(Occlusion::new(spec, N_AV, Nested)),
+    make: |spec| Box::new(Occlusion::new(spec, 1, Nested)),
 };
-
-/// For `auto` alone: it has no interval of its own.
-const N_AV: u32 = 5;
 
 struct Nested;
 

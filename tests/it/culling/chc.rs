@@ -79,7 +79,7 @@ fn boxes_that_the_near_plane_cuts_are_visible_without_a_query() {
     let long = [DVec3::new(-50.0, 3.0, 0.0), DVec3::new(50.0, 3.0, 0.0), DVec3::new(50.0, 3.0, 1.0)];
     let scene = scene_of("near", &[near, screen(5.0, -50.0, 50.0), long]);
     let h = tree(&scene, 1, 0);
-    for walk in ["nested_query", "chc"] {
+    for walk in ["nested_query", "chc", "chc_pp"] {
         let camera = Camera { near_m: 0.1, ..Camera::default() };
         let mut setup = setup(&scene, &h, &camera, &[ahead(); 3], "frustum", walk);
         let (lists, work) = pass(&mut setup);
@@ -132,7 +132,7 @@ fn a_pass_forgets_the_one_before() {
     let scene = scene("rooms");
     let h = build("octree:depth=4", &scene);
     let poses: Vec<Pose> = way(&scene, 10, 0.1);
-    for walk in ["chc"] {
+    for walk in ["chc", "chc_pp", "chc_pp:backend=latency"] {
         let mut setup = setup(&scene, &h, &Camera::default(), &poses, "frustum", &small(walk));
         assert!(setup.walk.remembers());
         let (first, second) = (pass(&mut setup), pass(&mut setup));
