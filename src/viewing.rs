@@ -119,8 +119,10 @@ impl RunView {
         let Setup { scene, hierarchy, views, removes, .. } = &self.setup;
         let decisions = self.watch.read(|heard| match self.setup.walk.removes().occluded {
             true => {
-                let submitted = heard.submitted.as_ref().unwrap_or(&self.list.ranges);
-                self.numbers.decisions_by_list(hierarchy, &heard.answers, submitted)
+                // In order of drawing, which need not be that of positions.
+                let mut submitted = heard.submitted.as_ref().unwrap_or(&self.list.ranges).clone();
+                submitted.sort_unstable();
+                self.numbers.decisions_by_list(hierarchy, &heard.answers, &submitted)
             }
             false => self.numbers.decisions(hierarchy, &heard.answers),
         });

@@ -3,6 +3,8 @@
 //! them; neither knows any structure.
 
 pub mod back_face;
+pub mod chc;
+pub mod chc_pp;
 pub mod depth_first;
 mod descent;
 pub mod distinct;
@@ -39,6 +41,7 @@ pub mod frustum_world;
 pub mod frustum_x86;
 pub mod look_at;
 pub mod mailbox;
+pub mod nested_query;
 pub mod normal_cone;
 pub mod normal_mask;
 mod normal_mask_local;
@@ -47,6 +50,7 @@ pub mod portals;
 pub mod portals_screen;
 #[cfg(target_arch = "x86_64")]
 mod prefetch_x86;
+pub mod queries;
 mod saturation;
 pub mod sector;
 #[cfg(target_arch = "x86_64")]
@@ -256,7 +260,8 @@ pub static TESTS: &[Entry<dyn Test>] = &[
 ];
 
 /// Sorted by name.
-pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, flat::ENTRY, portals::ENTRY];
+pub static WALKS: &[Entry<dyn Walk>] =
+    &[chc::ENTRY, chc_pp::ENTRY, depth_first::ENTRY, flat::ENTRY, nested_query::ENTRY, portals::ENTRY];
 
 /// The parts of a sum, made, and their resolved specs.
 pub type Sum = (Vec<Box<dyn Test>>, Vec<Spec>);

@@ -64,6 +64,24 @@ counters! {
     notes_read: "entries",
     /// Those of them whose triangle was drawn already.
     copies_dropped: "entries",
+    /// Occlusion queries issued.
+    queries: "queries",
+    /// Boxes that they asked about, summed.
+    boxes_queried: "boxes",
+    /// Queries of several nodes at once.
+    multiqueries: "queries",
+    /// Those that showed something, so that their nodes were asked about one by one.
+    multiqueries_failed: "queries",
+    /// Triangles drawn so that they hide what comes later.
+    occluders_drawn: "triangles",
+    /// Nodes found hidden that were not drawn, and the entries at and below them.
+    nodes_occluded: "nodes",
+    entries_occluded: "entries",
+    /// On the virtual clock: waiting for answers, and the whole frame.
+    stall_ns: "ns",
+    virtual_ns: "ns",
+    /// Frames without queries because they did not pay.
+    frames_off: "frames",
 }
 
 impl Tally {

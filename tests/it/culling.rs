@@ -4,6 +4,8 @@
 mod arithmetics;
 mod back_face;
 mod build;
+mod chc;
+mod chc_pp;
 mod cones;
 mod facing;
 mod fixed;
@@ -15,6 +17,7 @@ mod octants;
 mod portals;
 mod portals_facts;
 mod primitives;
+mod queries;
 mod sat;
 mod sectors;
 mod skipping;

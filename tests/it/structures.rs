@@ -42,7 +42,7 @@ pub fn scene_of(name: &str, triangles: &[[DVec3; 3]]) -> Scene {
 }
 
 /// Two triangles for each unit square of an n x n floor.
-fn floor(n: u32, height: impl Fn(f64, f64) -> f64) -> Vec<[DVec3; 3]> {
+pub fn floor(n: u32, height: impl Fn(f64, f64) -> f64) -> Vec<[DVec3; 3]> {
     let corner = |i: u32, j: u32| DVec3::new(f64::from(i), f64::from(j), height(f64::from(i), f64::from(j)));
     let square = |i, j| {
         let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];

@@ -66,7 +66,11 @@ fn walked(view: &View, h: &Hierarchy, tests: &mut [Box<dyn Test>], walk: &mut dy
     let mut out = DrawList::default();
     tests.iter_mut().for_each(|t| t.begin(view, h));
     walk.run(view, h, tests, &mut out, &mut Tally::default());
-    out.ranges
+    // In order of positions, whatever the order of drawing.
+    out.ranges.sort_unstable();
+    let mut list = DrawList::default();
+    out.ranges.iter().for_each(|(first, end)| list.push(*first, *end));
+    list.ranges
 }
 
 fn sums() -> Vec<String> {
@@ -104,6 +108,7 @@ fn marks_of_nodes_make_up_what_the_walk_submitted_and_jumping_changes_nothing() 
                 let mut tests = make_tests(&parse_sum(culling).unwrap()).unwrap().0;
                 tests.iter_mut().for_each(|t| _ = t.prepare(&scene, &h));
                 let mut own = make();
+                own.prepare(&scene, &h);
                 let mut view = view_of(&scene, &poses, &camera, &h, culling, make());
                 let mut frames = Vec::new();
                 for (n, pose) in poses.iter().enumerate() {
