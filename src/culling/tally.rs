@@ -90,5 +90,6 @@ impl Tally {
     pub const ALWAYS: usize = 8;
     /// Counters that are kept frame by frame where they are not 0: what charts draw
     /// against the frame.
-    pub const BY_FRAME: [&str; 0] = [];
+    pub const BY_FRAME: [&str; 6] =
+        ["frames_off", "nodes_occluded", "occluders_drawn", "queries", "stall_ns", "virtual_ns"];
 }

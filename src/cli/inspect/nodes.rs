@@ -24,8 +24,10 @@ impl Nodes {
         let (numbers, hierarchy) = (Numbers::of(&setup.hierarchy), &setup.hierarchy);
         let decisions = watch.read(|heard| match setup.walk.removes().occluded {
             true => {
-                let submitted = heard.submitted.as_ref().unwrap_or(&list.ranges);
-                numbers.decisions_by_list(hierarchy, &heard.answers, submitted)
+                // In order of drawing, which need not be that of positions.
+                let mut submitted = heard.submitted.as_ref().unwrap_or(&list.ranges).clone();
+                submitted.sort_unstable();
+                numbers.decisions_by_list(hierarchy, &heard.answers, &submitted)
             }
             false => numbers.decisions(hierarchy, &heard.answers),
         });

@@ -51,6 +51,8 @@ pub trait Backend: Send {
     fn prices(&self) -> Prices;
     /// Forgets queries that were never taken.
     fn reset(&mut self);
+    /// The depth of what was drawn, where it is to be had: for pictures.
+    fn buffer(&mut self) -> Option<&mut DepthBuffer>;
 }
 
 pub(super) const AUTO: Param = Param {

@@ -163,4 +163,8 @@ impl Backend for Software {
         self.answers.clear();
         self.oldest = 0;
     }
+
+    fn buffer(&mut self) -> Option<&mut DepthBuffer> {
+        Some(&mut self.buffer)
+    }
 }

@@ -83,6 +83,10 @@ impl<O: Order> Walk for Occlusion<O> {
         }
     }
 
+    fn buffer(&mut self) -> Option<&mut crate::raster::DepthBuffer> {
+        self.backend.buffer()
+    }
+
     fn samples(&self) -> Option<(u32, u32)> {
         Some(self.samples)
     }
