@@ -53,10 +53,10 @@ fn on_a_coherent_path_fewer_queries_and_less_time_than_chc() {
                 entries(&chc_lists),
                 entries(&pp_lists)
             );
-            assert!((0..2).all(|i| us[i][1] < us[i][0]), "{what}");
             // The longer the latency, the dearer a multiquery that fails, whose nodes are
             // asked about in another round: it must have many others to make up for.
-            assert!(us[2][1] < us[2][0] || total(&chc).queries < 1000, "{what}");
+            let rounds = if total(&chc).queries < 1000 { 1 } else { 3 };
+            assert!((0..rounds).all(|i| us[i][1] < us[i][0]), "{what}");
         }
     }
 }

@@ -99,9 +99,9 @@ pub fn nothing_seen_is_lost(
         positions.sort_unstable();
         assert!(positions.windows(2).all(|w| w[0] < w[1]), "{what}: a position is drawn twice");
     }
-    assert_eq!(judgement.frames_hash, setup.judge(truth).frames_hash, "{what}");
-    let again: Vec<Tally> = pass(&mut setup).1.iter().map(|w| w.tally).collect();
-    assert_eq!(again, work.iter().map(|w| w.tally).collect::<Vec<_>>(), "{what}: counted work repeats");
+    let (again, work_again) = pass(&mut setup);
+    assert_eq!(again, lists, "{what}: a pass repeats");
+    assert!(work.iter().zip(&work_again).all(|(a, b)| a.tally == b.tally), "{what}: counted work repeats");
 }
 
 /// Some panes, some walls without a back.
@@ -123,17 +123,17 @@ fn structures() -> Vec<String> {
 // D1.1
 #[test]
 fn nothing_that_the_same_samples_see_is_lost_on_any_structure() {
-    for scene in [scene("rooms"), scene("blocks:triangles=3000"), soup(141, 1500, 10.0, 1.5)] {
-        let scene = with_panes(scene);
-        let poses = way(&scene, 10, 0.13);
+    let worlds = [scene("rooms"), scene("blocks:triangles=3000"), soup(141, 1500, 10.0, 1.5)];
+    for (s, scene) in worlds.into_iter().map(with_panes).enumerate() {
+        let poses = way(&scene, 8, 0.13);
         for (i, camera) in cameras(9.0).iter().enumerate() {
             let truth = truth_of(&scene, camera, &poses);
             for (j, structure) in structures().iter().enumerate() {
                 let h = build(structure, &scene);
                 for (k, walk) in WALKS.iter().chain(super::chc_pp::WALKS.iter()).enumerate() {
-                    // Every camera, structure and sum with every walk, though not all at once.
-                    let culling = ["frustum", "none", "frustum+normal_mask+back_face"][(i + j + k) % 3];
-                    if i == 0 || (j + k) % 3 == i {
+                    // Every structure with every walk, over the scenes with every camera.
+                    if (s + i + j + k) % 3 == 0 {
+                        let culling = ["frustum", "none", "frustum+normal_mask+back_face"][(i + 2 * j + k) % 3];
                         nothing_seen_is_lost(&scene, &h, (camera, &poses, &truth), (culling, walk));
                     }
                 }
@@ -153,7 +153,7 @@ fn nothing_is_lost_of_degenerate_scenes() {
             facing(eye, if i == 0 { DVec3::X } else { b.centre() - eye })
         };
         let poses: Vec<Pose> = around.iter().enumerate().map(looking).flat_map(|p| [p, p]).collect();
-        for structure in ["octree:policy=E", "list", "bvh"] {
+        for structure in ["octree:policy=E", "list"] {
             let h = structure::make(&Spec::parse(structure).unwrap()).unwrap().0.build(scene).unwrap();
             for camera in cameras(reach) {
                 let truth = truth_of(scene, &camera, &poses);
@@ -222,7 +222,8 @@ fn asking_every_node_draws_least_and_in_many_calls() {
         );
         assert!(nested < plain, "{nested} of {plain}");
         assert!(others.iter().all(|o| nested <= o.0), "fewest of all");
-        assert!(others.iter().any(|o| work.queries > 2 * o.2.queries), "and many queries");
+        let queries = others.map(|o| o.2.queries);
+        assert!(work.queries > queries[2] && work.queries > 2 * queries[1], "{} {queries:?}", work.queries);
         assert!(calls * plain > plain_calls * nested, "more calls a triangle");
     }
 }
