@@ -42,6 +42,7 @@ pub mod mailbox;
 pub mod normal_cone;
 pub mod normal_mask;
 mod normal_mask_local;
+pub mod occlusion_tree;
 pub mod octant_mask;
 pub mod portals;
 pub mod portals_screen;
@@ -51,6 +52,7 @@ mod saturation;
 pub mod sector;
 #[cfg(target_arch = "x86_64")]
 pub mod sector_x86;
+mod shadows;
 mod skipping;
 mod tally;
 pub mod triangle_words;
@@ -209,6 +211,11 @@ pub trait Walk: Send {
     fn removes(&self) -> Removes {
         Removes::default()
     }
+    /// The samples at which a sample-conservative walk promises to lose nothing; truth for
+    /// its verdict is taken there. Columns and rows.
+    fn samples(&self) -> Option<(u32, u32)> {
+        None
+    }
     /// What lets it skip whole frames, if it has that.
     fn skipping(&mut self) -> Option<&mut Skipping> {
         None
@@ -246,7 +253,7 @@ pub static TESTS: &[Entry<dyn Test>] = &[
 ];
 
 /// Sorted by name.
-pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, flat::ENTRY, portals::ENTRY];
+pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, flat::ENTRY, occlusion_tree::ENTRY, portals::ENTRY];
 
 /// The parts of a sum, made, and their resolved specs.
 pub type Sum = (Vec<Box<dyn Test>>, Vec<Spec>);

@@ -64,6 +64,14 @@ counters! {
     notes_read: "entries",
     /// Those of them whose triangle was drawn already.
     copies_dropped: "entries",
+    /// Boxes asked about whether something hides them.
+    boxes_queried: "boxes",
+    /// Nodes found hidden that were not drawn, and the entries at and below them.
+    nodes_occluded: "nodes",
+    entries_occluded: "entries",
+    /// Polygons whose shadows make an occlusion tree, and the planes that it has.
+    occluders_chosen: "polygons",
+    shadow_planes: "planes",
 }
 
 impl Tally {

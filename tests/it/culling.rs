@@ -11,6 +11,8 @@ mod frustum;
 mod kernels;
 mod masks;
 mod numbers;
+mod occluding;
+mod occlusion_tree;
 mod octants;
 mod portals;
 mod portals_facts;

@@ -31,8 +31,9 @@ impl<'a> Method<'a> {
         for t in &mut tests {
             t.prepare(scene, hierarchy);
         }
-        let (walk, _) = make_walk(&Spec::parse(walk).unwrap()).unwrap();
+        let (mut walk, _) = make_walk(&Spec::parse(walk).unwrap()).unwrap();
         assert_eq!(walk.refuses(hierarchy), None);
+        walk.prepare(scene, hierarchy);
         Method { hierarchy, tests, walk }
     }
 
