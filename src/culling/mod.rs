@@ -37,11 +37,13 @@ pub mod frustum_volume;
 pub mod frustum_world;
 #[cfg(target_arch = "x86_64")]
 pub mod frustum_x86;
+pub mod hiz_two_pass;
 pub mod look_at;
 pub mod mailbox;
 pub mod normal_cone;
 pub mod normal_mask;
 mod normal_mask_local;
+mod occluders;
 pub mod occlusion_tree;
 pub mod octant_mask;
 pub mod portals;
@@ -253,7 +255,8 @@ pub static TESTS: &[Entry<dyn Test>] = &[
 ];
 
 /// Sorted by name.
-pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, flat::ENTRY, occlusion_tree::ENTRY, portals::ENTRY];
+pub static WALKS: &[Entry<dyn Walk>] =
+    &[depth_first::ENTRY, flat::ENTRY, hiz_two_pass::ENTRY, occlusion_tree::ENTRY, portals::ENTRY];
 
 /// The parts of a sum, made, and their resolved specs.
 pub type Sum = (Vec<Box<dyn Test>>, Vec<Spec>);

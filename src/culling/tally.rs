@@ -66,6 +66,8 @@ counters! {
     copies_dropped: "entries",
     /// Boxes asked about whether something hides them.
     boxes_queried: "boxes",
+    /// Triangles drawn so that they hide what comes later.
+    occluders_drawn: "triangles",
     /// Nodes found hidden that were not drawn, and the entries at and below them.
     nodes_occluded: "nodes",
     entries_occluded: "entries",

@@ -8,6 +8,7 @@ mod cones;
 mod facing;
 mod fixed;
 mod frustum;
+mod hiz_two_pass;
 mod kernels;
 mod masks;
 mod numbers;
