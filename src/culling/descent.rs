@@ -97,6 +97,11 @@ impl Descent {
         }
     }
 
+    /// Judged blocks on the way to the visited lane, its own included.
+    pub fn depth(&self) -> usize {
+        self.frames.len()
+    }
+
     /// The visited lane was judged and is not outside (it may be there only to be entered).
     pub fn is_kept(&self, at: Visit) -> bool {
         self.frames.last().is_some_and(|f| f.kept >> at.lane & 1 == 1)

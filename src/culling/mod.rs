@@ -39,12 +39,15 @@ pub mod frustum_volume;
 pub mod frustum_world;
 #[cfg(target_arch = "x86_64")]
 pub mod frustum_x86;
+pub mod hiz_two_pass;
 pub mod look_at;
 pub mod mailbox;
 pub mod nested_query;
 pub mod normal_cone;
 pub mod normal_mask;
 mod normal_mask_local;
+mod occluders;
+pub mod occlusion_tree;
 pub mod octant_mask;
 pub mod portals;
 pub mod portals_screen;
@@ -55,6 +58,7 @@ mod saturation;
 pub mod sector;
 #[cfg(target_arch = "x86_64")]
 pub mod sector_x86;
+mod shadows;
 mod skipping;
 mod tally;
 pub mod triangle_words;
@@ -260,8 +264,16 @@ pub static TESTS: &[Entry<dyn Test>] = &[
 ];
 
 /// Sorted by name.
-pub static WALKS: &[Entry<dyn Walk>] =
-    &[chc::ENTRY, chc_pp::ENTRY, depth_first::ENTRY, flat::ENTRY, nested_query::ENTRY, portals::ENTRY];
+pub static WALKS: &[Entry<dyn Walk>] = &[
+    chc::ENTRY,
+    chc_pp::ENTRY,
+    depth_first::ENTRY,
+    flat::ENTRY,
+    hiz_two_pass::ENTRY,
+    nested_query::ENTRY,
+    occlusion_tree::ENTRY,
+    portals::ENTRY,
+];
 
 /// The parts of a sum, made, and their resolved specs.
 pub type Sum = (Vec<Box<dyn Test>>, Vec<Spec>);

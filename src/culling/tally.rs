@@ -82,6 +82,9 @@ counters! {
     virtual_ns: "ns",
     /// Frames without queries because they did not pay.
     frames_off: "frames",
+    /// Polygons whose shadows make an occlusion tree, and the planes that it has.
+    occluders_chosen: "polygons",
+    shadow_planes: "planes",
 }
 
 impl Tally {

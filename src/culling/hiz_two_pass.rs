@@ -1,0 +1,195 @@
+//! `hiz_two_pass`: what was seen in the last frame is drawn first and hides the rest; what
+//! shows all the same is drawn second. The two-phase culling of GPU-driven renderers
+//! (Haar & Aaltonen, GPU-Driven Rendering Pipelines, 2015), by software.
+//!
+//! 1. Nodes that showed at the end of the last frame and are in view are drawn, also into
+//!    the depth buffer.
+//! 2. All nodes in view are asked about, down the hierarchy: below a hidden one nothing is.
+//!    Those that show and were not drawn yet are drawn.
+//!
+//! What showed in the second pass is what the next frame starts with, so a node that
+//! became hidden is drawn once more, and one that appears is drawn in the same frame. The
+//! first frame has nothing to start with and draws all that is in view.
+//!
+//! What we changed: the answers of the last frame are bits of nodes, not of objects; the
+//! second pass asks about inner nodes, too; what it draws does not go to the depth buffer,
+//! as nothing is asked after it.
+//!
+//! Sample-conservative: a node is left out only if the triangles of the first pass, all of
+//! them submitted, cover its box at every sample of the buffer. Conservative with inner
+//! coverage.
+
+use super::descent::Descent;
+use super::occluders::occluders_of;
+use super::*;
+use crate::hierarchy::NONE;
+use crate::raster::{Coverage, DepthBuffer, Occluders, Settings};
+
+pub const ENTRY: Entry<dyn Walk> = Entry {
+    name: "hiz_two_pass",
+    about: "draws what the last frame saw, then what shows behind its depth (Haar & Aaltonen 2015)",
+    revision: 1,
+    params: &[
+        Param {
+            name: "coverage",
+            default: Allowed::Choice(&["samples", "inner"]),
+            about: "pixels that hide: those whose centre is covered (sample-conservative), or those covered as a whole (conservative)",
+        },
+        Param {
+            name: "height_px",
+            default: Allowed::Int { value: 540, min: 1, max: 8192 },
+            about: "rows of the depth buffer",
+        },
+        Param {
+            name: "width_px",
+            default: Allowed::Int { value: 960, min: 1, max: 8192 },
+            about: "columns of the depth buffer",
+        },
+    ],
+    make: |spec| {
+        let coverage = if spec.text("coverage") == "inner" { Coverage::Inner } else { Coverage::Samples };
+        let (width_px, height_px) = (spec.int("width_px") as u32, spec.int("height_px") as u32);
+        Box::new(HizTwoPass::new(Settings { width_px, height_px, coverage }))
+    },
+};
+
+pub struct HizTwoPass {
+    buffer: DepthBuffer,
+    occluders: Occluders,
+    descent: Descent,
+    /// By block, the lanes that showed at the end of the last frame, and of this one. Those
+    /// above such a lane showed, too.
+    seen: Vec<u8>,
+    shows: Vec<u8>,
+}
+
+impl HizTwoPass {
+    pub fn new(settings: Settings) -> HizTwoPass {
+        HizTwoPass {
+            buffer: DepthBuffer::new(settings),
+            occluders: Occluders::default(),
+            descent: Descent::default(),
+            seen: Vec::new(),
+            shows: Vec::new(),
+        }
+    }
+
+    /// Submits what was seen in the last frame and is in view, and draws it as occluders.
+    fn first_pass(
+        &mut self,
+        hierarchy: &Hierarchy,
+        tests: &mut [Box<dyn Test>],
+        out: &mut DrawList,
+        tally: &mut Tally,
+    ) {
+        // The second pass visits all of these again, and counts them.
+        let visited = tally.nodes_visited;
+        let count = tests.len();
+        for root in 0..hierarchy.root_blocks {
+            if self.seen[root as usize] == 0 {
+                continue;
+            }
+            self.descent.clear();
+            self.descent.enter(hierarchy, root, self.seen[root as usize], 0, tests, None, tally);
+            while let Some(at) = self.descent.next(count) {
+                let links = &hierarchy.links[at.block as usize];
+                out.push(links.first[at.lane], links.own_end[at.lane]);
+                let child = links.child[at.lane];
+                if child != NONE && self.seen[child as usize] != 0 {
+                    self.descent.enter(hierarchy, child, self.seen[child as usize], 0, tests, Some(at), tally);
+                    self.descent.expect_children(hierarchy);
+                }
+            }
+        }
+        tally.nodes_visited = visited;
+        for (first, end) in &out.ranges {
+            tally.occluders_drawn += u64::from(self.buffer.draw(&self.occluders, *first, *end));
+        }
+    }
+
+    /// Submits what shows behind that and was not drawn yet; remembers all that shows.
+    fn second_pass(
+        &mut self,
+        hierarchy: &Hierarchy,
+        tests: &mut [Box<dyn Test>],
+        out: &mut DrawList,
+        tally: &mut Tally,
+    ) {
+        let count = tests.len();
+        for root in 0..hierarchy.root_blocks {
+            self.descent.clear();
+            self.descent.enter(hierarchy, root, hierarchy.links[root as usize].live, 0, tests, None, tally);
+            while let Some(at) = self.descent.next(count) {
+                let (block, bit) = (at.block as usize, 1u8 << at.lane);
+                let links = &hierarchy.links[block];
+                let drawn = self.seen[block] & bit != 0;
+                tally.boxes_queried += 1;
+                if !self.buffer.shows(&hierarchy.bounds[block].get(at.lane)) {
+                    if !drawn {
+                        tally.nodes_occluded += 1;
+                        tally.entries_occluded += u64::from(links.end[at.lane] - links.first[at.lane]);
+                    }
+                    continue;
+                }
+                self.shows[block] |= bit;
+                if !drawn {
+                    out.push(links.first[at.lane], links.own_end[at.lane]);
+                }
+                let child = links.child[at.lane];
+                if child != NONE {
+                    let live = hierarchy.links[child as usize].live;
+                    self.descent.enter(hierarchy, child, live, 0, tests, Some(at), tally);
+                    self.descent.expect_children(hierarchy);
+                }
+            }
+        }
+    }
+}
+
+impl Walk for HizTwoPass {
+    fn class(&self) -> Class {
+        match self.buffer.settings().coverage {
+            Coverage::Samples => Class::SampleConservative,
+            Coverage::Inner => Class::Conservative,
+        }
+    }
+
+    fn removes(&self) -> Removes {
+        Removes { outside_frustum: true, occluded: true, ..Removes::default() }
+    }
+
+    fn samples(&self) -> Option<(u32, u32)> {
+        let settings = self.buffer.settings();
+        Some((settings.width_px, settings.height_px))
+    }
+
+    fn refuses(&self, _: &Hierarchy) -> Option<String> {
+        None
+    }
+
+    fn prepare(&mut self, scene: &Scene, hierarchy: &Hierarchy) -> usize {
+        self.occluders = occluders_of(scene, hierarchy);
+        self.seen = vec![0; hierarchy.links.len()];
+        self.shows = self.seen.clone();
+        self.occluders.bytes() + self.buffer.bytes() + 2 * self.seen.len()
+    }
+
+    fn reset(&mut self) {
+        self.seen.fill(0);
+    }
+
+    fn run(
+        &mut self,
+        view: &View,
+        hierarchy: &Hierarchy,
+        tests: &mut [Box<dyn Test>],
+        out: &mut DrawList,
+        tally: &mut Tally,
+    ) {
+        self.buffer.begin(view, hierarchy.origin);
+        self.shows.fill(0);
+        self.first_pass(hierarchy, tests, out, tally);
+        self.second_pass(hierarchy, tests, out, tally);
+        std::mem::swap(&mut self.seen, &mut self.shows);
+    }
+}
