@@ -44,7 +44,8 @@ impl Plain {
         (r.y0..r.y1).map(move |y| &self.nearness[y as usize * width..][r.x0 as usize..r.x1 as usize])
     }
 
-    fn triangle(&mut self, screen: &Screen, corners: [DVec3; 3], two_sided: bool) {
+    /// A triangle with corners relative to the screen's origin.
+    pub fn triangle(&mut self, screen: &Screen, corners: [DVec3; 3], two_sided: bool) {
         let c = corners.map(|p| screen.camera(p));
         let polygon = in_front(screen, &c);
         if polygon.len() < 3 {
@@ -103,7 +104,7 @@ fn plane(p: &[DVec3]) -> Option<[f64; 3]> {
         .max_by(|i, j| cross(p[0], p[*i], p[*i + 1]).abs().total_cmp(&cross(p[0], p[*j], p[*j + 1]).abs()))?;
     let (a, b, c) = (p[0], p[i], p[i + 1]);
     let area = cross(a, b, c);
-    if area.abs() < 1e-3 {
+    if area.abs() < 1e-6 {
         return None;
     }
     let gx = ((b.z - a.z) * (c.y - a.y) - (c.z - a.z) * (b.y - a.y)) / area;

@@ -70,6 +70,16 @@ impl Screen {
         DVec3::new(c.x * scale + self.width_px * 0.5, c.y * scale + self.height_px * 0.5, nearness)
     }
 
+    /// A depth that nothing within the bounds reaches; 0 if they are empty.
+    pub fn farthest(&self, lo: DVec3, hi: DVec3) -> f64 {
+        if !(lo.x <= hi.x) {
+            return 0.0;
+        }
+        let [_, _, forward] = self.rows;
+        let most = forward.max(DVec3::ZERO).dot(hi - self.eye) + forward.min(DVec3::ZERO).dot(lo - self.eye);
+        most + 1e-6 * (hi - lo).max_element() + 1.0
+    }
+
     pub fn place(&self, b: &Box32) -> Place {
         if b.is_empty() {
             return Place::Outside;

@@ -16,6 +16,7 @@ mod manifest;
 mod oracle;
 #[cfg(feature = "service")]
 mod preflight;
+mod raster;
 #[cfg(feature = "service")]
 mod readers;
 #[cfg(feature = "service")]
