@@ -12,6 +12,11 @@ pub mod facing_fixed;
 pub mod facing_kernels;
 #[cfg(target_arch = "x86_64")]
 pub mod facing_x86;
+pub mod fast_v;
+mod fast_v_facet;
+mod fast_v_frusta;
+mod fast_v_lens;
+mod fast_v_mesh;
 pub mod flat;
 pub mod frustum;
 pub mod frustum_arithmetic;
@@ -246,7 +251,7 @@ pub static TESTS: &[Entry<dyn Test>] = &[
 ];
 
 /// Sorted by name.
-pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, flat::ENTRY, portals::ENTRY];
+pub static WALKS: &[Entry<dyn Walk>] = &[depth_first::ENTRY, fast_v::ENTRY, flat::ENTRY, portals::ENTRY];
 
 /// The parts of a sum, made, and their resolved specs.
 pub type Sum = (Vec<Box<dyn Test>>, Vec<Spec>);

@@ -64,6 +64,14 @@ counters! {
     notes_read: "entries",
     /// Those of them whose triangle was drawn already.
     copies_dropped: "entries",
+    /// Frusta of a subdivided image in which blockers were looked for.
+    frusta: "frusta",
+    /// Triangles, alone or with their neighbours, that were found to fill a frustum.
+    blockers: "blockers",
+    /// Triangles tried as such, alone or with their neighbours.
+    blocker_tries: "triangles",
+    /// Triangles whose edges and plane were set up on the image.
+    facets: "triangles",
 }
 
 impl Tally {
