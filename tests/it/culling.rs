@@ -6,6 +6,7 @@ mod back_face;
 mod build;
 mod cones;
 mod facing;
+mod fast_v;
 mod fixed;
 mod frustum;
 mod kernels;
