@@ -48,8 +48,8 @@ pub const ENTRY: Entry<dyn Walk> = Entry {
     params: &[
         Param {
             name: "g",
-            default: Allowed::Choice(&["64", "1", "2", "4", "8", "16", "32", "128", "256", "512", "1024", "2048"]),
-            about: "frusta to a side of the image, at most where the subdivision is adaptive",
+            default: Allowed::Int { value: 256, min: 1, max: 4096 },
+            about: "frusta to a side of the image, a power of two; at most so many where the subdivision is adaptive",
         },
         Param {
             name: "subdivision",
@@ -77,16 +77,33 @@ pub const ENTRY: Entry<dyn Walk> = Entry {
         },
     ],
     make: |spec| {
-        let g: u32 = spec.text("g").parse().expect("the choices are numbers");
         let adaptive = spec.text("subdivision") == "adaptive";
         Box::new(FastV::new(Options {
-            levels: g.trailing_zeros(),
+            levels: spec.int("g").trailing_zeros(),
             enough: if adaptive { spec.int("limit") as usize } else { 0 },
             grow: spec.int("grow") as usize,
             clipped: spec.text("depth") == "clipped",
         }))
     },
 };
+
+/// Quarters of quarters: what `g` the registry cannot refuse by itself.
+///
+/// # Errors
+/// If it is no power of two.
+pub fn check(resolved: &Spec) -> Result<()> {
+    let g = match resolved.params.get("g") {
+        Some(Value::Int(g)) if resolved.kind == ENTRY.name => *g,
+        _ => return Ok(()),
+    };
+    if g.count_ones() == 1 {
+        return Ok(());
+    }
+    let above = (g as u64).next_power_of_two();
+    Err(Error::new(format!("is {g}, but must be a power of two"))
+        .key("g")
+        .help(format!("frusta are quartered: take {} or {above}", above / 2)))
+}
 
 pub struct FastV {
     options: Options,
@@ -149,8 +166,8 @@ impl Walk for FastV {
         None
     }
 
-    fn prepare(&mut self, scene: &Scene, _: &Hierarchy) -> usize {
-        self.mesh = Mesh::new(scene);
+    fn prepare(&mut self, scene: &Scene, hierarchy: &Hierarchy) -> usize {
+        self.mesh = Mesh::new(scene, &hierarchy.entries);
         self.mesh.bytes()
     }
 

@@ -41,19 +41,25 @@ pub fn is_drawn(lens: &Lens, mesh: &Mesh, t: u32, corners: &[DVec3; 3], signs: &
     facing == Facing::Front
 }
 
-/// Where a triangle shows at most, and the key of its nearest point; nothing if certainly
-/// nowhere in the view volume. `off_m`: how far the corners may be from where they belong.
+/// Where a triangle shows at most, and the keys of its farthest and nearest point; nothing
+/// if certainly nowhere in the view volume. `off_m`: how far the corners may be from where
+/// they belong.
 #[inline]
-pub fn place(lens: &Lens, corners: &[DVec3; 3], off_m: f64) -> Option<(Rect, f64)> {
+pub fn place(lens: &Lens, corners: &[DVec3; 3], off_m: f64) -> Option<(Rect, [f64; 2])> {
     let p = corners.map(|c| lens.to_camera(c));
-    let error = 8.0 * U * (p[0].length() + p[1].length() + p[2].length()) + 2.0 * off_m;
-    let deepest = p[0].z.max(p[1].z).max(p[2].z) + error;
-    let key = lens.nearest_key(p[0].z.min(p[1].z).min(p[2].z) - error);
-    if lens.is_before_near(deepest) || key < lens.key_far {
+    // The sum of coordinates is no less than the length.
+    let size = (p[0].abs() + p[1].abs() + p[2].abs()).element_sum();
+    let error = 8.0 * U * size + 2.0 * off_m;
+    let (nearest, deepest) = (p[0].z.min(p[1].z).min(p[2].z) - error, p[0].z.max(p[1].z).max(p[2].z) + error);
+    let keys = [lens.farthest_key(deepest), lens.nearest_key(nearest)];
+    if lens.is_before_near(deepest) || keys[1] < lens.key_far {
         return None;
     }
-    let rect = sides(lens, &p, error).iter().fold(Rect::EMPTY, |all, r| all.join(r));
-    rect.overlaps(&lens.image).then_some((rect, key))
+    let rect = match lens.beyond(&p, nearest, error) {
+        Some(rect) => rect,
+        None => sides(lens, &p, error).iter().fold(Rect::EMPTY, |all, r| all.join(r)),
+    };
+    rect.overlaps(&lens.image).then_some((rect, keys))
 }
 
 fn sides(lens: &Lens, p: &[DVec3; 3], error: f64) -> [Rect; 3] {

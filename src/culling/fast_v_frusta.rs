@@ -25,6 +25,8 @@ use std::sync::Mutex;
 /// Share of the depth by which what is hidden lies behind its blocker at least: surfaces
 /// nearer than that to each other are one, whoever judges.
 const BEHIND: f64 = 1.0 / (1u64 << 26) as f64;
+/// Nodes with so many triangles in all are opened before a frustum is divided.
+const FEW: usize = 256;
 /// Levels whose frusta are tasks of their own.
 const TASK_LEVELS: u32 = 3;
 
@@ -68,6 +70,8 @@ struct Item {
     rect: Rect,
     /// Of the nearest point.
     key: f64,
+    /// Of the farthest point of a piece's triangle.
+    key_min: f64,
     id: u32,
     kind: Kind,
     /// Below this node all is kept.
@@ -159,19 +163,26 @@ impl Frame<'_> {
             rest &= rest - 1;
             if let Some((rect, key)) = self.lens.node(&self.hierarchy.bounds[block as usize], lane) {
                 let settled = settled || self.settled[block as usize] >> lane & 1 == 1;
-                take(Item { rect, key, id: block * LANES as u32 + lane as u32, kind: Kind::Node, settled });
+                take(Item {
+                    rect,
+                    key,
+                    key_min: f64::NEG_INFINITY,
+                    id: block * LANES as u32 + lane as u32,
+                    kind: Kind::Node,
+                    settled,
+                });
             }
         }
     }
 
     /// What of the piece at `position` may be seen through its node.
     fn piece(&self, position: u32, node: &Item, signs: &mut Signs) -> Option<Item> {
-        let t = self.hierarchy.entries[position as usize];
+        let t = self.mesh.triangle_at(position);
         let corners = self.mesh.corners(t);
         if !is_drawn(self.lens, self.mesh, t, &corners, signs) {
             return None;
         }
-        let (rect, key) = match &self.hierarchy.fragments {
+        let (rect, [key_min, key]) = match &self.hierarchy.fragments {
             None => place(self.lens, &corners, 0.0)?,
             Some(fragments) => {
                 // Corners of fragments were rounded once a cut.
@@ -181,7 +192,8 @@ impl Frame<'_> {
                 place(self.lens, piece, error)?
             }
         };
-        Some(Item { rect: rect.meet(&node.rect), key: key.min(node.key), id: position, kind: Kind::Piece, ..*node })
+        let (rect, key) = (rect.meet(&node.rect), key.min(node.key));
+        Some(Item { rect, key, key_min, id: position, kind: Kind::Piece, ..*node })
     }
 }
 
@@ -255,6 +267,12 @@ impl Scratch {
             return;
         }
         let far = self.block(frame, cell, start, far);
+        if levels > 0 {
+            self.thin(frame, cell, start, far);
+            if self.nothing_is_open(start) {
+                return;
+            }
+        }
         if self.is_enough(frame, cell, start, far, levels) {
             return;
         }
@@ -296,11 +314,11 @@ impl Scratch {
             if item.kind == Kind::Node {
                 let from = self.items.len();
                 self.items[next.at].kind = Kind::Gone;
-                self.open(frame, cell, &item, far);
+                self.open(frame, cell, &item, far, true);
                 self.expect(centre, from);
                 continue;
             }
-            let t = frame.hierarchy.entries[item.id as usize];
+            let t = frame.mesh.triangle_at(item.id);
             // Grown over already, in vain or not.
             if self.grown[t as usize] >= first {
                 continue;
@@ -317,6 +335,35 @@ impl Scratch {
         }
         self.tidy(start, far);
         far
+    }
+
+    /// Where few triangles are left, looks at each: if all that are seen were found in other
+    /// frusta, there is no need to divide this one.
+    fn thin(&mut self, frame: &Frame, cell: &Rect, start: usize, far: f64) {
+        let entries = |item: &Item| {
+            let links = &frame.hierarchy.links[item.id as usize / LANES];
+            (links.end[item.id as usize % LANES] - links.first[item.id as usize % LANES]) as usize
+        };
+        let nodes = self.items[start..].iter().filter(|i| i.kind == Kind::Node);
+        if nodes.map(entries).sum::<usize>() > FEW {
+            return;
+        }
+        let mut at = start;
+        while at < self.items.len() {
+            let item = self.items[at];
+            let stays = match item.kind {
+                Kind::Node => {
+                    self.open(frame, cell, &item, far, true);
+                    false
+                }
+                _ => self.is_known(item.id) || self.is_seen(frame, cell, &item, far),
+            };
+            if !stays {
+                self.items[at].kind = Kind::Gone;
+            }
+            at += 1;
+        }
+        self.tidy(start, far);
     }
 
     /// Puts the items from `from` on that the central ray may hit in line.
@@ -340,11 +387,15 @@ impl Scratch {
         self.items.truncate(to);
     }
 
-    /// Appends what is directly below a node.
-    fn open(&mut self, frame: &Frame, cell: &Rect, node: &Item, far: f64) {
+    /// Appends what is directly below a node; pieces that were found already only if they
+    /// are `wanted` nevertheless.
+    fn open(&mut self, frame: &Frame, cell: &Rect, node: &Item, far: f64, wanted: bool) {
         let (block, lane) = (node.id as usize / LANES, node.id as usize % LANES);
         let links = &frame.hierarchy.links[block];
         for position in links.first[lane]..links.own_end[lane] {
+            if !wanted && self.is_known(position) {
+                continue;
+            }
             if let Some(item) = frame.piece(position, node, &mut self.signs)
                 && item.rect.overlaps(cell)
                 && item.key >= far
@@ -379,7 +430,7 @@ impl Scratch {
             let open = match item.kind {
                 Kind::Gone => false,
                 Kind::Node => {
-                    self.open(frame, cell, &item, far);
+                    self.open(frame, cell, &item, far, levels > 0);
                     false
                 }
                 // At the end of the subdivision nobody counts.
@@ -410,11 +461,11 @@ impl Scratch {
     /// in front of what fills it?
     fn is_seen(&mut self, frame: &Frame, cell: &Rect, item: &Item, far: f64) -> bool {
         self.tally.triangle_tests += 1;
-        let behind = frame.options.clipped && far > frame.lens.key_far;
+        let behind = frame.options.clipped && item.key_min < far;
         if !behind && item.rect.within(cell) {
             return true;
         }
-        let facet = self.facet(frame, frame.hierarchy.entries[item.id as usize]);
+        let facet = self.facet(frame, frame.mesh.triangle_at(item.id));
         let facet = &self.facets[facet];
         !facet.avoids(cell, frame.lens, frame.mesh, &mut self.signs)
             && !(behind && facet.key_over(&item.rect.meet(cell))[1] < far)

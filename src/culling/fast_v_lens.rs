@@ -56,10 +56,6 @@ impl Rect {
         }
     }
 
-    pub fn is_empty(&self) -> bool {
-        !(self.lo[0] <= self.hi[0] && self.lo[1] <= self.hi[1])
-    }
-
     pub fn centre(&self) -> [f64; 2] {
         [0.5 * (self.lo[0] + self.hi[0]), 0.5 * (self.lo[1] + self.hi[1])]
     }
@@ -193,6 +189,22 @@ impl Lens {
         out
     }
 
+    /// What points show that are all deep enough to be projected; `nearest_m` bounds their
+    /// depth from below.
+    #[inline]
+    pub fn beyond<'a>(&self, points: impl IntoIterator<Item = &'a DVec3>, nearest_m: f64, error: f64) -> Option<Rect> {
+        if !self.perspective || !(nearest_m >= 0.5 * self.near_m) {
+            return None;
+        }
+        let mut plain = Rect::EMPTY;
+        for c in points {
+            let depth = 1.0 / c.z;
+            let at = [c.x * depth, c.y * depth];
+            plain = plain.join(&Rect { lo: at, hi: at });
+        }
+        Some(padded(plain, error, nearest_m))
+    }
+
     /// What the box of a node shows, and the key of its nearest point; nothing if it is
     /// certainly outside of the image or of near and far plane.
     pub fn node(&self, bounds: &BoundsBlock, lane: usize) -> Option<(Rect, f64)> {
@@ -214,14 +226,8 @@ impl Lens {
         let rect = if !self.perspective {
             let wide = arms[0].abs() + arms[1].abs() + arms[2].abs() + DVec3::splat(error);
             Rect { lo: [centre.x - wide.x, centre.y - wide.y], hi: [centre.x + wide.x, centre.y + wide.y] }
-        } else if centre.z - deep >= 0.5 * self.near_m {
-            let mut plain = Rect::EMPTY;
-            for c in (0..8).map(corner) {
-                let depth = 1.0 / c.z;
-                let at = [c.x * depth, c.y * depth];
-                plain = plain.join(&Rect { lo: at, hi: at });
-            }
-            padded(plain, error, centre.z - deep)
+        } else if let Some(rect) = self.beyond(&std::array::from_fn::<_, 8, _>(corner), centre.z - deep, error) {
+            rect
         } else {
             let edges = (0..8).flat_map(|i| [1, 2, 4].map(|bit| (i, i | bit))).filter(|(i, j)| i != j);
             edges.fold(Rect::EMPTY, |all, (i, j)| all.join(&self.segment(corner(i), corner(j), error)))

@@ -4,7 +4,11 @@
 //! Files and generators repeat vertices (a normal or a texture coordinate differs), so
 //! indices say nothing of what is connected; equal coordinates do, bit by bit but for the
 //! sign of zero. Nothing is moved: what is not welded exactly stays apart.
+//!
+//! Triangles and corners are numbered in the order in which the structure has them, so that
+//! what lies together in space does so in memory.
 
+use crate::hierarchy::NONE;
 use crate::math::DVec3;
 use crate::scene::Scene;
 use rayon::prelude::*;
@@ -14,8 +18,10 @@ const OCCLUDER: u8 = 2;
 
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
+    /// By position in the structure: the triangle, numbered by first position.
+    of: Vec<u32>,
+    /// Each place once.
     points: Vec<DVec3>,
-    /// Numbers of corners after welding: of equal positions the first.
     corners: Vec<[u32; 3]>,
     /// By side `3 t + k` (opposite corner `k`): the next side at the same edge, round and
     /// round; itself at a free edge.
@@ -24,23 +30,44 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    pub fn new(scene: &Scene) -> Mesh {
+    /// `entries`: by position in the structure, the triangle of the scene.
+    pub fn new(scene: &Scene, entries: &[u32]) -> Mesh {
+        let mut mesh = Mesh::default();
         let welded = weld(&scene.positions);
-        let corners: Vec<[u32; 3]> = scene.triangles.iter().map(|t| t.map(|v| welded[v as usize])).collect();
-        let flag = |on: bool, bit: u8| if on { bit } else { 0 };
-        let flags = scene.two_sided.iter().zip(&scene.occluder);
-        Mesh {
-            ring: rings(&corners),
-            corners,
-            points: scene.positions.clone(),
-            flags: flags.map(|(t, o)| flag(*t, TWO_SIDED) | flag(*o, OCCLUDER)).collect(),
+        let mut numbers = [vec![NONE; scene.len()], vec![NONE; scene.positions.len()]];
+        for t in entries {
+            let (number, next) = (&mut numbers[0][*t as usize], mesh.corners.len() as u32);
+            if *number == NONE {
+                *number = next;
+                let corners = scene.triangles[*t as usize].map(|v| {
+                    let first = welded[v as usize] as usize;
+                    if numbers[1][first] == NONE {
+                        numbers[1][first] = mesh.points.len() as u32;
+                        mesh.points.push(scene.positions[first]);
+                    }
+                    numbers[1][first]
+                });
+                mesh.corners.push(corners);
+                let flag = |on: bool, bit: u8| if on { bit } else { 0 };
+                let (two_sided, occluder) = (scene.two_sided[*t as usize], scene.occluder[*t as usize]);
+                mesh.flags.push(flag(two_sided, TWO_SIDED) | flag(occluder, OCCLUDER));
+            }
+            mesh.of.push(numbers[0][*t as usize]);
         }
+        mesh.ring = rings(&mesh.corners);
+        mesh
     }
 
     pub fn len(&self) -> usize {
         self.corners.len()
     }
 
+    #[inline]
+    pub fn triangle_at(&self, position: u32) -> u32 {
+        self.of[position as usize]
+    }
+
+    #[inline]
     pub fn corners(&self, t: u32) -> [DVec3; 3] {
         self.corners[t as usize].map(|v| self.points[v as usize])
     }
@@ -67,7 +94,8 @@ impl Mesh {
     }
 
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.points[..])
+        size_of_val(&self.of[..])
+            + size_of_val(&self.points[..])
             + size_of_val(&self.corners[..])
             + size_of_val(&self.ring[..])
             + size_of_val(&self.flags[..])
@@ -130,11 +158,12 @@ mod tests {
 
     #[test]
     fn equal_positions_are_one_corner_and_edges_know_who_meets_there() {
-        let mesh = Mesh::new(&square());
+        let mesh = Mesh::new(&square(), &[0, 1, 2, 1]);
         // a-c is opposite corner 1 of the first, opposite 2 of the others.
         let mut met: Vec<_> = mesh.across(0, 1).collect();
         met.sort_unstable();
         assert_eq!(met, [(1, false), (2, false)], "both run from a to c, the first from c to a");
+        assert_eq!((mesh.triangle_at(3), mesh.len(), mesh.points.len()), (1, 3, 5));
         assert_eq!(mesh.across(1, 2).find(|(t, _)| *t == 2), Some((2, true)));
         assert_eq!(mesh.across(0, 0).count() + mesh.across(0, 2).count(), 0, "free edges");
     }
@@ -145,7 +174,7 @@ mod tests {
         scene.positions[4].x = scene.positions[4].x.next_up();
         scene.positions.truncate(6);
         scene.triangles.truncate(2);
-        let mesh = Mesh::new(&scene);
+        let mesh = Mesh::new(&scene, &[0, 1]);
         assert!((0..3).all(|k| mesh.across(0, k).count() == 0));
     }
 
@@ -153,7 +182,7 @@ mod tests {
     fn a_triangle_with_equal_corners_has_no_neighbour_there() {
         let mut scene = square();
         scene.triangles = vec![[0, 0, 1], [0, 0, 2]];
-        let mesh = Mesh::new(&scene);
+        let mesh = Mesh::new(&scene, &[0, 1]);
         assert_eq!(mesh.across(0, 2).count(), 0);
     }
 }

@@ -312,8 +312,15 @@ pub fn arithmetic_of(spec: &Spec) -> Arithmetic {
     }
 }
 
-pub fn make_walk(spec: &Spec) -> Result<(Box<dyn Walk>, Spec)> {
+/// Finds and checks a walk, also what the type of a parameter cannot say.
+pub fn find_walk(spec: &Spec) -> Result<(&'static Entry<dyn Walk>, Spec)> {
     let (entry, resolved) = find("walk", WALKS, spec)?;
+    fast_v::check(&resolved)?;
+    Ok((entry, resolved))
+}
+
+pub fn make_walk(spec: &Spec) -> Result<(Box<dyn Walk>, Spec)> {
+    let (entry, resolved) = find_walk(spec)?;
     Ok((entry.build(&resolved), resolved))
 }
 

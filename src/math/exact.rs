@@ -180,18 +180,13 @@ pub fn sign_of_plane(normal: DVec3, d: f64, origin: DVec3, offset: DVec3, eye: D
 /// A point `p` shows at the quotients of `(basis[0], basis[1]) . (p - eye)` and
 /// `basis[2] . (p - eye)`; without `perspective` at the former two themselves. With ends
 /// before and behind the eye, the sign of the triple product.
-pub fn sign_on_image(
-    ends: [DVec3; 2],
-    eye: DVec3,
-    basis: &[DVec3; 3],
-    perspective: bool,
-    at: [f64; 2],
-) -> Ordering {
+pub fn sign_on_image(ends: [DVec3; 2], eye: DVec3, basis: &[DVec3; 3], perspective: bool, at: [f64; 2]) -> Ordering {
     // A one must be whole in these units, too.
     let unit_p = common_unit(&[ends[0], ends[1], eye]).min(0);
     let unit_b = common_unit(basis).min(0);
     let along = |p: DVec3, axis: DVec3| {
-        let part = |k: usize| Whole::of(p[k], unit_p).minus(&Whole::of(eye[k], unit_p)).times(&Whole::of(axis[k], unit_b));
+        let part =
+            |k: usize| Whole::of(p[k], unit_p).minus(&Whole::of(eye[k], unit_p)).times(&Whole::of(axis[k], unit_b));
         part(0).plus(&part(1)).plus(&part(2))
     };
     let row = |p: DVec3| {

@@ -77,7 +77,8 @@ fn some(turn: usize) -> impl Iterator<Item = [&'static str; 3]> {
 // D7.1
 #[test]
 fn nothing_that_is_seen_is_lost() {
-    for (turn, name) in ["rooms", "blocks", "arena:triangles=14000", "spheres:spheres=9,level=4"].into_iter().enumerate()
+    for (turn, name) in
+        ["rooms", "blocks", "arena:triangles=14000", "spheres:spheres=9,level=4"].into_iter().enumerate()
     {
         let mut scene = scene(name);
         let eyes = [("inside", "any", 7), ("outside", "scene", 3)];
@@ -168,7 +169,9 @@ fn nothing_is_lost_from_the_plane_of_a_triangle_from_its_edge_and_through_the_ne
     let [p, q] = [DVec3::new(0.0, -4.0, -4.0), DVec3::new(0.0, 4.0, 4.0)];
     // A grid of squares: from its axis all edges pass through rays of frusta.
     let square = |x: f64, n: i32| {
-        let at = move |i: i32, j: i32| DVec3::new(x, f64::from(i) / f64::from(n) * 8.0, f64::from(j) / f64::from(n) * 8.0) + p;
+        let at = move |i: i32, j: i32| {
+            DVec3::new(x, f64::from(i) / f64::from(n) * 8.0, f64::from(j) / f64::from(n) * 8.0) + p
+        };
         (0..n * n).flat_map(move |k| {
             let (i, j) = (k % n, k / n);
             let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
@@ -185,7 +188,8 @@ fn nothing_is_lost_from_the_plane_of_a_triangle_from_its_edge_and_through_the_ne
         poses.push(facing(DVec3::new(4.0, 0.0, 0.0), DVec3::Y));
         let wide = Camera { projection: Projection::Perspective { fov_y_rad: 3.0 }, ..Camera::default() };
         let narrow = Camera { projection: Projection::Perspective { fov_y_rad: 1e-3 }, ..Camera::default() };
-        let square = Camera { projection: Projection::Perspective { fov_y_rad: 90f64.to_radians() }, aspect: 1.0, ..wide };
+        let square =
+            Camera { projection: Projection::Perspective { fov_y_rad: 90f64.to_radians() }, aspect: 1.0, ..wide };
         for (j, camera) in cameras(8.0).into_iter().chain([wide, narrow, square]).enumerate() {
             let truth = truth_of(scene, &camera, &poses, 8);
             for parts in some(turn + j).skip(j % 4).step_by(4) {
