@@ -14,6 +14,11 @@ pub mod facing_fixed;
 pub mod facing_kernels;
 #[cfg(target_arch = "x86_64")]
 pub mod facing_x86;
+pub mod fast_v;
+mod fast_v_facet;
+mod fast_v_frusta;
+mod fast_v_lens;
+mod fast_v_mesh;
 pub mod flat;
 pub mod frustum;
 pub mod frustum_arithmetic;
@@ -268,6 +273,7 @@ pub static WALKS: &[Entry<dyn Walk>] = &[
     chc::ENTRY,
     chc_pp::ENTRY,
     depth_first::ENTRY,
+    fast_v::ENTRY,
     flat::ENTRY,
     hiz_two_pass::ENTRY,
     nested_query::ENTRY,
@@ -334,8 +340,15 @@ pub fn arithmetic_of(spec: &Spec) -> Arithmetic {
     }
 }
 
-pub fn make_walk(spec: &Spec) -> Result<(Box<dyn Walk>, Spec)> {
+/// Finds and checks a walk, also what the type of a parameter cannot say.
+pub fn find_walk(spec: &Spec) -> Result<(&'static Entry<dyn Walk>, Spec)> {
     let (entry, resolved) = find("walk", WALKS, spec)?;
+    fast_v::check(&resolved)?;
+    Ok((entry, resolved))
+}
+
+pub fn make_walk(spec: &Spec) -> Result<(Box<dyn Walk>, Spec)> {
+    let (entry, resolved) = find_walk(spec)?;
     Ok((entry.build(&resolved), resolved))
 }
 

@@ -85,6 +85,14 @@ counters! {
     /// Polygons whose shadows make an occlusion tree, and the planes that it has.
     occluders_chosen: "polygons",
     shadow_planes: "planes",
+    /// Frusta of a subdivided image in which blockers were looked for.
+    frusta: "frusta",
+    /// Triangles, alone or with their neighbours, that were found to fill a frustum.
+    blockers: "blockers",
+    /// Triangles tried as such, alone or with their neighbours.
+    blocker_tries: "triangles",
+    /// Triangles whose edges and plane were set up on the image.
+    facets: "triangles",
 }
 
 impl Tally {

@@ -68,7 +68,7 @@ pub static AXES: &[Axis] = &[
         settled: None,
         complete: None,
         parts: || parts(culling::WALKS),
-        check: |spec| find("walk", culling::WALKS, spec).map(|(_, s)| s),
+        check: |spec| culling::find_walk(spec).map(|(_, s)| s),
     },
     Axis {
         name: arithmetic::NAME,

@@ -175,6 +175,29 @@ pub fn sign_of_plane(normal: DVec3, d: f64, origin: DVec3, offset: DVec3, eye: D
     sum.sign()
 }
 
+/// On which side of the edge from the image of `ends[0]` to that of `ends[1]` a point lies
+/// on the image plane: positive is left of it, where the image's x is to the right and y up.
+/// A point `p` shows at the quotients of `(basis[0], basis[1]) . (p - eye)` and
+/// `basis[2] . (p - eye)`; without `perspective` at the former two themselves. With ends
+/// before and behind the eye, the sign of the triple product.
+pub fn sign_on_image(ends: [DVec3; 2], eye: DVec3, basis: &[DVec3; 3], perspective: bool, at: [f64; 2]) -> Ordering {
+    // A one must be whole in these units, too.
+    let unit_p = common_unit(&[ends[0], ends[1], eye]).min(0);
+    let unit_b = common_unit(basis).min(0);
+    let along = |p: DVec3, axis: DVec3| {
+        let part =
+            |k: usize| Whole::of(p[k], unit_p).minus(&Whole::of(eye[k], unit_p)).times(&Whole::of(axis[k], unit_b));
+        part(0).plus(&part(1)).plus(&part(2))
+    };
+    let row = |p: DVec3| {
+        let last = if perspective { along(p, basis[2]) } else { Whole::of(1.0, unit_p + unit_b) };
+        [along(p, basis[0]), along(p, basis[1]), last]
+    };
+    let at = DVec3::new(at[0], at[1], 1.0);
+    let unit = common_unit(&[at]);
+    sign_of_rows(&at.to_array().map(|x| Whole::of(x, unit)), &row(ends[0]), &row(ends[1]))
+}
+
 fn common_unit(points: &[DVec3]) -> i32 {
     points.iter().flat_map(|p| p.to_array()).filter(|x| *x != 0.0).map(|x| decompose(x).1).min().unwrap_or(0)
 }
@@ -228,6 +251,26 @@ mod tests {
             prop_assert_eq!(sign_of_plane(point(0), d as f64 * small, point(3), point(6), point(9)), want);
             let want = (i128::from(dot) + (i128::from(d) << shift)).cmp(&0);
             prop_assert_eq!(sign_of_plane(point(0), d as f64 / small, point(3), point(6), point(9)), want);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_side_on_the_image_is_that_of_small_whole_numbers(
+            m in proptest::array::uniform20(-50i64..50), shift in 0i32..60, perspective in any::<bool>(),
+        ) {
+            // All at once in other units: no sign depends on them.
+            let unit = libm::exp2(f64::from(-shift));
+            let point = |i: usize, unit: f64| DVec3::new(m[i] as f64, m[i + 1] as f64, m[i + 2] as f64) * unit;
+            let basis = [point(9, 1.0), point(12, 1.0), point(15, 1.0)];
+            let along = |p: usize, axis: usize| (0..3).map(|k| (m[p + k] - m[6 + k]) * m[axis + k]).sum::<i64>();
+            let row = |p: usize| [along(p, 9), along(p, 12), if perspective { along(p, 15) } else { 1 }];
+            let ([ax, ay, az], [bx, by, bz]) = (row(0), row(3));
+            let want = m[18] * (ay * bz - az * by) + m[19] * (az * bx - ax * bz) + (ax * by - ay * bx);
+            let (ends, at) = ([point(0, unit), point(3, unit)], [m[18] as f64, m[19] as f64]);
+            // Parallel rays know lengths, so there the image shrinks with the scene.
+            let at = if perspective { at } else { at.map(|x| x * unit) };
+            prop_assert_eq!(sign_on_image(ends, point(6, unit), &basis, perspective, at), want.cmp(&0));
         }
     }
 

@@ -1,4 +1,4 @@
-//! Culling tests and walks: facts B2-B5, C1, C3, C4, D8, A8 and H of the algorithm notes, and
+//! Culling tests and walks: facts B2-B5, C1, C3, C4, D7, D8, A8 and H of the algorithm notes, and
 //! the agreement of all kernels, accelerations and walks.
 
 mod arithmetics;
@@ -8,6 +8,9 @@ mod chc;
 mod chc_pp;
 mod cones;
 mod facing;
+mod fast_v;
+mod fast_v_facts;
+mod fast_v_twin;
 mod fixed;
 mod frustum;
 mod hiz_two_pass;
