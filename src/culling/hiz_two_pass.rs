@@ -158,6 +158,10 @@ impl Walk for HizTwoPass {
         Removes { outside_frustum: true, occluded: true, ..Removes::default() }
     }
 
+    fn buffer(&mut self) -> Option<&mut DepthBuffer> {
+        Some(&mut self.buffer)
+    }
+
     fn samples(&self) -> Option<(u32, u32)> {
         let settings = self.buffer.settings();
         Some((settings.width_px, settings.height_px))
