@@ -109,8 +109,8 @@ fn run(scene: &Scene, h: &Hierarchy, poses: &[Pose], walk: &str, timed: bool) ->
         setup.reset();
         let start = cpu_ns();
         let mut tallies = vec![Tally::default(); poses.len()];
-        for n in 0..poses.len() {
-            setup.cull(n, &mut out, &mut tallies[n]);
+        for (n, tally) in tallies.iter_mut().enumerate() {
+            setup.cull(n, &mut out, tally);
             if turn == 0 {
                 frame.entries += out.entry_count() as f64;
                 frame.calls += out.draw_calls(h) as f64;
