@@ -109,8 +109,8 @@ fn run(scene: &Scene, h: &Hierarchy, poses: &[Pose], walk: &str, timed: bool) ->
         setup.reset();
         let start = cpu_ns();
         let mut tallies = vec![Tally::default(); poses.len()];
-        for n in 0..poses.len() {
-            setup.cull(n, &mut out, &mut tallies[n]);
+        for (n, tally) in tallies.iter_mut().enumerate() {
+            setup.cull(n, &mut out, tally);
             if turn == 0 {
                 frame.entries += out.entry_count() as f64;
                 frame.calls += out.draw_calls(h) as f64;
@@ -134,7 +134,9 @@ fn scene(name: &str) -> (Scene, Vec<Pose>) {
         return (scene, poses);
     }
     let mesh = ["glb", "obj"].map(|e| folder.join(format!("{name}.{e}"))).into_iter().find(|p| p.exists()).unwrap();
-    let spec = load::describe(name, SceneSource::File(mesh), Winding::TwoSided, Some(Up::Z), 1.0, true).unwrap();
+    // As the manifest of the shared scenes says.
+    let up = if name.starts_with("q3") || name.starts_with("aws") { Up::Z } else { Up::Y };
+    let spec = load::describe(name, SceneSource::File(mesh), Winding::TwoSided, Some(up), 1.0, true).unwrap();
     let scene = load::load(&spec).unwrap();
     let source = PathSource::File(folder.join(format!("{name}_path1.csv")));
     let path =

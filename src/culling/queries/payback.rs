@@ -5,8 +5,9 @@
 //! counted and priced as on the virtual clock. Below 1 the walk goes on as a plain
 //! `depth_first` for [`RETRY`] times the interval of re-tests. Then queries are tried
 //! until every visible leaf was asked about and the answer used, as the first frame knows
-//! nothing of the scene, and stay only if the last of these frames was worth [`ON`]: the thresholds lie
-//! apart so that a scene between them does not flicker. Nothing is lost either way.
+//! nothing of the scene, and stay only if the last of these frames was worth [`ON`]: the
+//! thresholds lie apart so that a scene between them does not flicker. The memory of nodes
+//! stands still meanwhile: what was visible is tried first. Nothing is lost either way.
 
 /// Yield above which queries that were tried stay, and below which they stop.
 pub const ON: f64 = 1.25;
