@@ -50,6 +50,8 @@ pub mod portals;
 pub mod portals_screen;
 #[cfg(target_arch = "x86_64")]
 mod prefetch_x86;
+pub mod pvs;
+mod pvs_cells;
 mod saturation;
 pub mod sector;
 #[cfg(target_arch = "x86_64")]
@@ -256,7 +258,7 @@ pub static TESTS: &[Entry<dyn Test>] = &[
 
 /// Sorted by name.
 pub static WALKS: &[Entry<dyn Walk>] =
-    &[depth_first::ENTRY, flat::ENTRY, hiz_two_pass::ENTRY, occlusion_tree::ENTRY, portals::ENTRY];
+    &[depth_first::ENTRY, flat::ENTRY, hiz_two_pass::ENTRY, occlusion_tree::ENTRY, portals::ENTRY, pvs::ENTRY];
 
 /// The parts of a sum, made, and their resolved specs.
 pub type Sum = (Vec<Box<dyn Test>>, Vec<Spec>);

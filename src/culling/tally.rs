@@ -74,6 +74,10 @@ counters! {
     /// Polygons whose shadows make an occlusion tree, and the planes that it has.
     occluders_chosen: "polygons",
     shadow_planes: "planes",
+    /// Triangles of the visible set that was looked up, and by its own estimate the share
+    /// of what can be seen that it lacks.
+    pvs_members: "triangles",
+    pvs_missing_ppm: "ppm",
 }
 
 impl Tally {

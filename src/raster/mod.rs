@@ -8,6 +8,7 @@
 //! What a query answers is an upper bound: a box of which it says 0 pixels shows at no
 //! sample ([`Coverage::Samples`]), or nowhere at all ([`Coverage::Inner`]).
 
+pub mod items;
 pub mod occluders;
 pub mod plain;
 pub mod project;

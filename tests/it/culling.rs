@@ -18,6 +18,7 @@ mod octants;
 mod portals;
 mod portals_facts;
 mod primitives;
+mod pvs;
 mod sat;
 mod sectors;
 mod skipping;
