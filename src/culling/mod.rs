@@ -59,6 +59,8 @@ pub mod portals_screen;
 #[cfg(target_arch = "x86_64")]
 mod prefetch_x86;
 pub mod queries;
+pub mod pvs;
+mod pvs_cells;
 mod saturation;
 pub mod sector;
 #[cfg(target_arch = "x86_64")]
@@ -279,6 +281,7 @@ pub static WALKS: &[Entry<dyn Walk>] = &[
     nested_query::ENTRY,
     occlusion_tree::ENTRY,
     portals::ENTRY,
+    pvs::ENTRY,
 ];
 
 /// The parts of a sum, made, and their resolved specs.

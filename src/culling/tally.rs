@@ -93,6 +93,10 @@ counters! {
     blocker_tries: "triangles",
     /// Triangles whose edges and plane were set up on the image.
     facets: "triangles",
+    /// Triangles of the visible set that was looked up, and by its own estimate the share
+    /// of what can be seen that it lacks.
+    pvs_members: "triangles",
+    pvs_missing_ppm: "ppm",
 }
 
 impl Tally {

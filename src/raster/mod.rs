@@ -24,6 +24,7 @@ mod lanes_avx2;
 mod lanes_avx512;
 mod lanes_scalar;
 mod large;
+pub mod items;
 pub mod occluders;
 pub mod plain;
 pub mod project;

@@ -76,7 +76,7 @@ pub fn chart<'a>(results: &'a StudyResults, sweep: &'a Sweep) -> Result<Chart<'a
             panels.len() - 1
         });
         let lines = &mut panels[at].1.lines;
-        let by = by_value(run, &sweep.by);
+        let by = line_of(run, sweep);
         let at = lines.iter().position(|l| l.by == by).unwrap_or_else(|| {
             lines.push(Line { by, points: Vec::new() });
             lines.len() - 1
@@ -100,6 +100,24 @@ pub fn chart<'a>(results: &'a StudyResults, sweep: &'a Sweep) -> Result<Chart<'a
         }
     }
     Ok(Chart { sweep, metric, against, panels })
+}
+
+/// The line of a run: its value of the axis [`Sweep::by`], less the stressor if it stands there.
+fn line_of(run: &RunResult, sweep: &Sweep) -> String {
+    let value = by_value(run, &sweep.by);
+    match sweep.x.split_once('.') {
+        Some((part, key)) if part == sweep.by && parse_sum(&value).is_ok() => without(&value, key),
+        _ => value,
+    }
+}
+
+/// A sum of parts without the parameter `key`.
+fn without(sum: &str, key: &str) -> String {
+    let strip = |mut part: Spec| {
+        part.params.remove(key);
+        part.to_string()
+    };
+    parse_sum(sum).unwrap_or_default().into_iter().map(strip).collect::<Vec<_>>().join("+")
 }
 
 /// The value of the axis whose values are the lines.
@@ -130,8 +148,7 @@ fn family(run: &RunResult, sweep: &Sweep, follows: bool) -> Vec<(String, String)
         if part != name {
             return text.to_string();
         }
-        let parts = parse_sum(text).unwrap_or_default();
-        parts.iter().map(strip).collect::<Vec<_>>().join("+")
+        without(text, key)
     };
     let s = &run.spec;
     // Members of a family are named by the values that set them apart; without such a

@@ -23,6 +23,7 @@ mod octants;
 mod portals;
 mod portals_facts;
 mod primitives;
+mod pvs;
 mod queries;
 mod sat;
 mod sectors;
