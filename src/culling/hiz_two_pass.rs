@@ -20,37 +20,17 @@
 //! coverage.
 
 use super::descent::Descent;
-use super::occluders::occluders_of;
+use super::occluders::{COVERAGE, HEIGHT_PX, WIDTH_PX, class_of, occluders_of, settings_of};
 use super::*;
 use crate::hierarchy::NONE;
-use crate::raster::{Coverage, DepthBuffer, Occluders, Settings};
+use crate::raster::{DepthBuffer, Occluders, Settings};
 
 pub const ENTRY: Entry<dyn Walk> = Entry {
     name: "hiz_two_pass",
     about: "draws what the last frame saw, then what shows behind its depth (Haar & Aaltonen 2015)",
     revision: 1,
-    params: &[
-        Param {
-            name: "coverage",
-            default: Allowed::Choice(&["samples", "inner"]),
-            about: "pixels that hide: those whose centre is covered (sample-conservative), or those covered as a whole (conservative)",
-        },
-        Param {
-            name: "height_px",
-            default: Allowed::Int { value: 540, min: 1, max: 8192 },
-            about: "rows of the depth buffer",
-        },
-        Param {
-            name: "width_px",
-            default: Allowed::Int { value: 960, min: 1, max: 8192 },
-            about: "columns of the depth buffer",
-        },
-    ],
-    make: |spec| {
-        let coverage = if spec.text("coverage") == "inner" { Coverage::Inner } else { Coverage::Samples };
-        let (width_px, height_px) = (spec.int("width_px") as u32, spec.int("height_px") as u32);
-        Box::new(HizTwoPass::new(Settings { width_px, height_px, coverage }))
-    },
+    params: &[COVERAGE, HEIGHT_PX, WIDTH_PX],
+    make: |spec| Box::new(HizTwoPass::new(settings_of(spec))),
 };
 
 pub struct HizTwoPass {
@@ -148,10 +128,7 @@ impl HizTwoPass {
 
 impl Walk for HizTwoPass {
     fn class(&self) -> Class {
-        match self.buffer.settings().coverage {
-            Coverage::Samples => Class::SampleConservative,
-            Coverage::Inner => Class::Conservative,
-        }
+        class_of(self.buffer.settings().coverage)
     }
 
     fn removes(&self) -> Removes {

@@ -58,9 +58,9 @@ pub mod portals;
 pub mod portals_screen;
 #[cfg(target_arch = "x86_64")]
 mod prefetch_x86;
-pub mod queries;
 pub mod pvs;
 mod pvs_cells;
+pub mod queries;
 mod saturation;
 pub mod sector;
 #[cfg(target_arch = "x86_64")]

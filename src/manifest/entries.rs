@@ -216,7 +216,11 @@ pub fn expand_part(
             if wrong.as_ref() == Some(&place) {
                 continue;
             }
-            match check(&Spec::new(kind).with(&name.name, v.clone())) {
+            // Alone, that is where it has an effect: what stands beside it is checked below.
+            let conditions = param.map_or_else(Vec::new, |p| p.default.conditions());
+            let alone =
+                conditions.into_iter().fold(Spec::new(kind), |s, (with, is)| s.with(with, Value::Text(is[0].into())));
+            match check(&alone.with(&name.name, v.clone())) {
                 Ok(_) => list.push((name.name.clone(), v)),
                 Err(mut e) => {
                     e.key = None;

@@ -16,6 +16,7 @@
 mod block;
 mod code;
 mod fill;
+pub mod items;
 mod kernel;
 mod lanes;
 #[cfg(target_arch = "x86_64")]
@@ -24,7 +25,6 @@ mod lanes_avx2;
 mod lanes_avx512;
 mod lanes_scalar;
 mod large;
-pub mod items;
 pub mod occluders;
 pub mod plain;
 pub mod project;

@@ -19,9 +19,11 @@ pub mod payback;
 pub mod software;
 pub mod stage;
 
+pub(super) use super::occluders::{COVERAGE, HEIGHT_PX, WIDTH_PX};
+use super::occluders::{class_of, occluders_of, settings_of};
 use super::*;
 use crate::math::Box32;
-use crate::raster::{Coverage, Settings};
+use crate::raster::Settings;
 pub use clock::{Prices, Times};
 pub use software::Software;
 pub use stage::{Occlusion, Order, Stage};
@@ -67,18 +69,6 @@ pub(super) const BACKEND: Param = Param {
     about: "who answers queries: a software depth buffer at once, or the same as late as a GPU on a virtual clock",
 };
 
-pub(super) const COVERAGE: Param = Param {
-    name: "coverage",
-    default: Allowed::Choice(&["samples", "inner"]),
-    about: "pixels that hide: those whose centre is covered (sample-conservative), or those covered as a whole (conservative)",
-};
-
-pub(super) const HEIGHT_PX: Param = Param {
-    name: "height_px",
-    default: Allowed::Int { value: 540, min: 1, max: 8192 },
-    about: "rows of the depth buffer",
-};
-
 const WITH_LATENCY: &[&str] = &["latency"];
 
 pub(super) const LATENCY_US: Param = Param {
@@ -113,17 +103,9 @@ pub(super) const QUERY_NS: Param = Param {
     about: "what a query costs the CPU on the virtual clock; the GPU half as much",
 };
 
-pub(super) const WIDTH_PX: Param = Param {
-    name: "width_px",
-    default: Allowed::Int { value: 960, min: 1, max: 8192 },
-    about: "columns of the depth buffer",
-};
-
 /// The back end that a resolved spec asks for.
 pub(super) fn backend(spec: &Spec) -> Box<dyn Backend> {
-    let coverage = if spec.text("coverage") == "inner" { Coverage::Inner } else { Coverage::Samples };
-    let (width_px, height_px) = (spec.int("width_px") as u32, spec.int("height_px") as u32);
-    let settings = Settings { width_px, height_px, coverage };
+    let settings = settings_of(spec);
     let latency = spec.text("backend") == "latency";
     let latency_ns = latency.then(|| spec.int("latency_us") as f64 * 1e3);
     let prices = if latency { Prices::gpu(spec.float("query_ns")) } else { Prices::software() };

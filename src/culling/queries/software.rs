@@ -6,9 +6,8 @@
 
 use super::clock::Clock;
 use super::*;
-use crate::hierarchy::NONE;
 use crate::math::DVec3;
-use crate::raster::{DepthBuffer, Kind, Occluders};
+use crate::raster::{DepthBuffer, Occluders};
 use std::collections::VecDeque;
 
 pub struct Software {
@@ -68,28 +67,11 @@ fn area_m2([a, b, c]: [DVec3; 3]) -> f64 {
 impl Backend for Software {
     fn prepare(&mut self, scene: &Scene, hierarchy: &Hierarchy) -> usize {
         let count = hierarchy.entries.len() as u32;
-        let kind = |position: u32| {
-            let t = hierarchy.entries[position as usize] as usize;
-            match (scene.occluder[t], scene.two_sided[t]) {
-                (false, _) => Kind::Clear,
-                (true, false) => Kind::OneSided,
-                (true, true) => Kind::TwoSided,
-            }
-        };
-        let mut starts: Vec<u32> = Vec::new();
-        for links in &hierarchy.links {
-            for lane in (0..8).filter(|l| links.live >> l & 1 == 1) {
-                let own = links.own_end[lane] > links.first[lane];
-                starts.extend(own.then_some(links.first[lane]).filter(|_| own || links.child[lane] == NONE));
-            }
-        }
-        starts.sort_unstable();
-        let corners = |position: u32| hierarchy.piece(scene, position);
-        self.occluders = Occluders::new(count, hierarchy.origin, corners, kind, &starts);
+        self.occluders = occluders_of(scene, hierarchy);
         self.area_before_m2.clear();
         if self.occluder_px > 0.0 {
             let sum = |sum: &mut f64, position| {
-                *sum += area_m2(corners(position));
+                *sum += area_m2(hierarchy.piece(scene, position));
                 Some(*sum)
             };
             self.area_before_m2 = std::iter::once(0.0).chain((0..count).scan(0.0, sum)).collect();

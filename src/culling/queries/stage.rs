@@ -29,8 +29,7 @@ pub struct Occlusion<O> {
     order: O,
     backend: Box<dyn Backend>,
     front: Front,
-    coverage: Coverage,
-    samples: (u32, u32),
+    settings: Settings,
     n_vp: u32,
     skipping: Skipping,
     payback: Option<Payback>,
@@ -45,8 +44,7 @@ impl<O: Order> Occlusion<O> {
             order,
             backend: backend(spec),
             front: Front::default(),
-            coverage: if spec.text("coverage") == "inner" { Coverage::Inner } else { Coverage::Samples },
-            samples: (spec.int("width_px") as u32, spec.int("height_px") as u32),
+            settings: settings_of(spec),
             n_vp: spec.int("n_vp") as u32,
             skipping: Skipping::new(spec),
             payback: spec.bool("auto").then(|| Payback::new(n_av)),
@@ -76,11 +74,7 @@ impl<O: Order> Occlusion<O> {
 
 impl<O: Order> Walk for Occlusion<O> {
     fn class(&self) -> Class {
-        match self.coverage {
-            _ if self.n_vp > 0 => Class::Aggressive,
-            Coverage::Samples => Class::SampleConservative,
-            Coverage::Inner => Class::Conservative,
-        }
+        if self.n_vp > 0 { Class::Aggressive } else { class_of(self.settings.coverage) }
     }
 
     fn buffer(&mut self) -> Option<&mut crate::raster::DepthBuffer> {
@@ -88,7 +82,7 @@ impl<O: Order> Walk for Occlusion<O> {
     }
 
     fn samples(&self) -> Option<(u32, u32)> {
-        Some(self.samples)
+        Some((self.settings.width_px, self.settings.height_px))
     }
 
     fn removes(&self) -> Removes {
