@@ -60,8 +60,8 @@ impl Surface {
     pub fn is_in(&mut self, frame: &Frame, cell: &Rect, item: &Item, far: f64, behind: bool) -> bool {
         let facet = self.facet(frame, frame.mesh.triangle_at(item.id));
         let facet = &self.facets[facet];
-        !facet.avoids(cell, frame.lens, frame.mesh, &mut self.signs)
-            && !(behind && facet.key_over(&item.rect.meet(cell))[1] < far)
+        let hidden = behind && facet.key_over(&item.rect.meet(cell))[1] < far;
+        !hidden && !facet.avoids(cell, frame.lens, frame.mesh, &mut self.signs)
     }
 
     fn facet(&mut self, frame: &Frame, t: u32) -> usize {

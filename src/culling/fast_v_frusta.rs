@@ -37,7 +37,7 @@ struct Task {
 
 /// What tasks write to, kept from frame to frame.
 #[derive(Default)]
-pub struct Pool(Mutex<Vec<Box<Scratch>>>);
+pub struct Pool(Mutex<Vec<Scratch>>);
 
 impl Pool {
     fn with<T>(&self, frame: &Frame, work: impl FnOnce(&mut Scratch) -> T) -> (T, Vec<u32>, Tally) {
