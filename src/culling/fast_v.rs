@@ -35,7 +35,8 @@
 //! leaks along every seam at any `g`.
 
 use super::descent::Descent;
-use super::fast_v_frusta::{Frame, Options, Pool, visible};
+use super::fast_v_frusta::{Pool, visible};
+use super::fast_v_items::{Frame, Options};
 use super::fast_v_lens::Lens;
 use super::fast_v_mesh::Mesh;
 use super::*;

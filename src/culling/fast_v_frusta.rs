@@ -12,13 +12,11 @@
 //! counted work know how many threads there are.
 
 use super::Tally;
-use super::fast_v_facet::{Facet, Signs, is_drawn, place};
-use super::fast_v_lens::{Lens, Rect, U};
-use super::fast_v_mesh::Mesh;
-use crate::hierarchy::{Hierarchy, LANES, NONE};
-use crate::math::DVec3;
+use super::fast_v_blockers::Surface;
+use super::fast_v_items::{Frame, Item, Kind, Next};
+use super::fast_v_lens::Rect;
+use crate::hierarchy::{LANES, NONE};
 use rayon::prelude::*;
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::sync::Mutex;
 
@@ -30,75 +28,6 @@ const FEW: usize = 256;
 /// Levels whose frusta are tasks of their own.
 const TASK_LEVELS: u32 = 3;
 
-#[derive(Debug, Clone, Copy)]
-pub struct Options {
-    /// The finest frusta are 2^levels to a side.
-    pub levels: u32,
-    /// A frustum with no more triangles is not divided; 0 divides all.
-    pub enough: usize,
-    /// Most triangles of a blocker.
-    pub grow: usize,
-    /// Depth is that of what lies in the frustum, not that of planes and whole triangles.
-    pub clipped: bool,
-}
-
-/// One frame.
-pub struct Frame<'a> {
-    pub lens: &'a Lens,
-    pub mesh: &'a Mesh,
-    pub hierarchy: &'a Hierarchy,
-    /// By block: lanes that the tests left, as far as they were asked.
-    pub kept: &'a [u8],
-    /// By block: lanes below which nobody was asked, as all is inside.
-    pub settled: &'a [u8],
-    pub options: Options,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    /// `id` is a node.
-    Node,
-    /// `id` is a position.
-    Piece,
-    /// Opened, or found to be outside.
-    Gone,
-}
-
-/// A node or a piece of triangle that may be seen in a frustum.
-#[derive(Debug, Clone, Copy)]
-struct Item {
-    rect: Rect,
-    /// Of the nearest point.
-    key: f64,
-    /// Of the farthest point of a piece's triangle.
-    key_min: f64,
-    id: u32,
-    kind: Kind,
-    /// Below this node all is kept.
-    settled: bool,
-}
-
-/// Nearest first; then in the order of the list.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Next {
-    key: f64,
-    at: usize,
-}
-
-impl Eq for Next {}
-
-impl PartialOrd for Next {
-    fn partial_cmp(&self, o: &Next) -> Option<Ordering> {
-        Some(self.cmp(o))
-    }
-}
-
-impl Ord for Next {
-    fn cmp(&self, o: &Next) -> Ordering {
-        self.key.total_cmp(&o.key).then(o.at.cmp(&self.at))
-    }
-}
-
 /// A frustum that waits: what its parent left it, hidden below the key `far`.
 struct Task {
     cell: Rect,
@@ -108,7 +37,7 @@ struct Task {
 
 /// What tasks write to, kept from frame to frame.
 #[derive(Default)]
-pub struct Pool(Mutex<Vec<Box<Scratch>>>);
+pub struct Pool(Mutex<Vec<Scratch>>);
 
 impl Pool {
     fn with<T>(&self, frame: &Frame, work: impl FnOnce(&mut Scratch) -> T) -> (T, Vec<u32>, Tally) {
@@ -147,93 +76,29 @@ pub fn visible(frame: &Frame, pool: &Pool) -> (Vec<Vec<u32>>, Tally) {
     (found, tallies.into_iter().sum())
 }
 
-impl Frame<'_> {
-    fn roots(&self) -> Vec<Item> {
-        let mut items = Vec::new();
-        for block in 0..self.hierarchy.root_blocks {
-            self.lanes(block, self.kept[block as usize], false, |item| items.push(item));
-        }
-        items
-    }
-
-    fn lanes(&self, block: u32, kept: u8, settled: bool, mut take: impl FnMut(Item)) {
-        let mut rest = kept;
-        while rest != 0 {
-            let lane = rest.trailing_zeros() as usize;
-            rest &= rest - 1;
-            if let Some((rect, key)) = self.lens.node(&self.hierarchy.bounds[block as usize], lane) {
-                let settled = settled || self.settled[block as usize] >> lane & 1 == 1;
-                take(Item {
-                    rect,
-                    key,
-                    key_min: f64::NEG_INFINITY,
-                    id: block * LANES as u32 + lane as u32,
-                    kind: Kind::Node,
-                    settled,
-                });
-            }
-        }
-    }
-
-    /// What of the piece at `position` may be seen through its node.
-    fn piece(&self, position: u32, node: &Item, signs: &mut Signs) -> Option<Item> {
-        let t = self.mesh.triangle_at(position);
-        let corners = self.mesh.corners(t);
-        if !is_drawn(self.lens, self.mesh, t, &corners, signs) {
-            return None;
-        }
-        let (rect, [key_min, key]) = match &self.hierarchy.fragments {
-            None => place(self.lens, &corners, 0.0)?,
-            Some(fragments) => {
-                // Corners of fragments were rounded once a cut.
-                let piece = &fragments[position as usize];
-                let size = |p: &DVec3| p.abs().max_element();
-                let error = 4096.0 * U * (piece.iter().map(size).fold(0.0, f64::max) + size(&self.lens.eye));
-                place(self.lens, piece, error)?
-            }
-        };
-        let (rect, key) = (rect.meet(&node.rect), key.min(node.key));
-        Some(Item { rect, key, key_min, id: position, kind: Kind::Piece, ..*node })
-    }
-}
-
 /// What one task writes to.
 #[derive(Default)]
 pub struct Scratch {
     /// Positions found so far, as bits and as a list.
     known: Vec<u64>,
     found: Vec<u32>,
-    /// By triangle: where its facet is, or [`NONE`].
-    slot: Vec<u32>,
-    facets: Vec<Facet>,
-    /// By triangle: the last growth that came to it.
-    grown: Vec<u32>,
-    growths: u32,
-    queue: Vec<u32>,
+    surface: Surface,
     /// Lists of the frusta from the task's own down to the present one.
     items: Vec<Item>,
     heap: BinaryHeap<Next>,
-    signs: Signs,
     tally: Tally,
 }
 
 impl Scratch {
     fn fit(&mut self, frame: &Frame) {
         self.known.resize(frame.hierarchy.entries.len().div_ceil(64), 0);
-        self.slot.resize(frame.mesh.len(), NONE);
-        self.grown.resize(frame.mesh.len(), 0);
-        if self.growths > u32::MAX / 2 {
-            self.grown.fill(0);
-            self.growths = 0;
-        }
+        self.surface.fit(frame.mesh.len());
     }
 
     fn finish(&mut self) -> (Vec<u32>, Tally) {
-        for facet in self.facets.drain(..) {
-            self.slot[facet.triangle as usize] = NONE;
-        }
+        self.tally.facets += self.surface.clear() as u64;
         self.found.iter().for_each(|p| self.known[*p as usize / 64] = 0);
-        let signs = std::mem::take(&mut self.signs);
+        let signs = std::mem::take(&mut self.surface.signs);
         let tally = std::mem::take(&mut self.tally);
         let counted = Tally { predicates: signs.asked, fallbacks_exact: signs.exact, ..tally };
         (std::mem::take(&mut self.found), counted)
@@ -302,7 +167,7 @@ impl Scratch {
     fn block(&mut self, frame: &Frame, cell: &Rect, start: usize, far: f64) -> f64 {
         self.tally.frusta += 1;
         let centre = cell.centre();
-        let first = self.growths + 1;
+        let first = self.surface.next_growth();
         let mut far = far;
         self.heap.clear();
         self.expect(centre, start);
@@ -320,17 +185,13 @@ impl Scratch {
             }
             let t = frame.mesh.triangle_at(item.id);
             // Grown over already, in vain or not.
-            if self.grown[t as usize] >= first {
+            if self.surface.is_grown(t, first) || !self.surface.is_hit(frame, t, centre) {
                 continue;
             }
-            let facet = self.facet(frame, t);
-            let seed = &self.facets[facet];
-            if seed.blocks && seed.covers(centre, frame.lens, frame.mesh, &mut self.signs) {
-                self.tally.blocker_tries += 1;
-                if let Some(key) = self.grow(frame, t, cell) {
-                    self.tally.blockers += 1;
-                    far = far.max(key - BEHIND * key.abs());
-                }
+            self.tally.blocker_tries += 1;
+            if let Some(key) = self.surface.grow(frame, t, cell) {
+                self.tally.blockers += 1;
+                far = far.max(key - BEHIND * key.abs());
             }
         }
         self.tidy(start, far);
@@ -396,7 +257,7 @@ impl Scratch {
             if !wanted && self.is_known(position) {
                 continue;
             }
-            if let Some(item) = frame.piece(position, node, &mut self.signs)
+            if let Some(item) = frame.piece(position, node, &mut self.surface.signs)
                 && item.rect.overlaps(cell)
                 && item.key >= far
             {
@@ -462,65 +323,6 @@ impl Scratch {
     fn is_seen(&mut self, frame: &Frame, cell: &Rect, item: &Item, far: f64) -> bool {
         self.tally.triangle_tests += 1;
         let behind = frame.options.clipped && item.key_min < far;
-        if !behind && item.rect.within(cell) {
-            return true;
-        }
-        let facet = self.facet(frame, frame.mesh.triangle_at(item.id));
-        let facet = &self.facets[facet];
-        !facet.avoids(cell, frame.lens, frame.mesh, &mut self.signs)
-            && !(behind && facet.key_over(&item.rect.meet(cell))[1] < far)
-    }
-
-    fn facet(&mut self, frame: &Frame, t: u32) -> usize {
-        let known = self.slot[t as usize];
-        if known != NONE {
-            return known as usize;
-        }
-        self.tally.facets += 1;
-        self.slot[t as usize] = self.facets.len() as u32;
-        self.facets.push(Facet::new(frame.lens, frame.mesh, t, &mut self.signs));
-        self.facets.len() - 1
-    }
-
-    /// The least key of the blocker around `seed`, if there is one.
-    fn grow(&mut self, frame: &Frame, seed: u32, cell: &Rect) -> Option<f64> {
-        let (lens, mesh) = (frame.lens, frame.mesh);
-        self.growths += 1;
-        self.queue.clear();
-        self.queue.push(seed);
-        self.grown[seed as usize] = self.growths;
-        let mut farthest = f64::INFINITY;
-        let mut at = 0;
-        while let Some(t) = self.queue.get(at).copied() {
-            at += 1;
-            let index = self.slot[t as usize] as usize;
-            let facet = &self.facets[index];
-            if !facet.is_beyond_near(cell, lens) {
-                return None;
-            }
-            let [key, _] = if frame.options.clipped { facet.key_over(cell) } else { facet.plane_key_over(cell) };
-            farthest = farthest.min(key);
-            let turned = facet.turned;
-            for k in 0..3 {
-                if !self.facets[index].enters(k, cell, lens, mesh, &mut self.signs) {
-                    continue;
-                }
-                let beyond = mesh.across(t, k).find(|(n, along)| {
-                    let n = self.facet(frame, *n);
-                    let facet = &self.facets[n];
-                    // On the other side of the edge as seen.
-                    facet.blocks && (facet.turned == turned) != *along
-                });
-                let (n, _) = beyond?;
-                if self.grown[n as usize] != self.growths {
-                    self.grown[n as usize] = self.growths;
-                    self.queue.push(n);
-                    if self.queue.len() > frame.options.grow {
-                        return None;
-                    }
-                }
-            }
-        }
-        Some(farthest)
+        !behind && item.rect.within(cell) || self.surface.is_in(frame, cell, item, far, behind)
     }
 }

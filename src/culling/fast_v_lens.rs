@@ -193,7 +193,7 @@ impl Lens {
     /// depth from below.
     #[inline]
     pub fn beyond<'a>(&self, points: impl IntoIterator<Item = &'a DVec3>, nearest_m: f64, error: f64) -> Option<Rect> {
-        if !self.perspective || !(nearest_m >= 0.5 * self.near_m) {
+        if !self.perspective || nearest_m < 0.5 * self.near_m || nearest_m.is_nan() {
             return None;
         }
         let mut plain = Rect::EMPTY;

@@ -15,8 +15,10 @@ pub mod facing_kernels;
 #[cfg(target_arch = "x86_64")]
 pub mod facing_x86;
 pub mod fast_v;
+mod fast_v_blockers;
 mod fast_v_facet;
 mod fast_v_frusta;
+mod fast_v_items;
 mod fast_v_lens;
 mod fast_v_mesh;
 pub mod flat;

@@ -98,7 +98,9 @@ impl<'a> Twin<'a> {
         if self.view.is_perspective() { a.dot(b.cross(c)) } else { flat(a).dot(flat(b).cross(flat(c))) }
     }
 
-    fn plane_depth(&self, t: usize, cell: [f64; 4]) -> f64 {
+    /// The least and the greatest depth of its plane at the rays of a frustum; endless where
+    /// a ray does not come to it.
+    fn plane_depths(&self, t: usize, cell: [f64; 4]) -> [f64; 2] {
         let [a, b, c] = self.corners[t];
         let n = (b - a).cross(c - a);
         let at = |x: f64, y: f64| {
@@ -109,7 +111,8 @@ impl<'a> Twin<'a> {
             if depth > 0.0 || !self.view.is_perspective() { depth } else { f64::INFINITY }
         };
         let [x0, y0, x1, y1] = cell;
-        at(x0, y0).max(at(x1, y0)).max(at(x1, y1)).max(at(x0, y1))
+        let depths = [at(x0, y0), at(x1, y0), at(x1, y1), at(x0, y1)];
+        [depths.into_iter().fold(f64::INFINITY, f64::min), depths.into_iter().fold(f64::NEG_INFINITY, f64::max)]
     }
 
     /// Depth of the farthest point of the blocker around `seed`, if there is one.
@@ -120,14 +123,17 @@ impl<'a> Twin<'a> {
             at += 1;
             let part = self.within(&self.corners[t], cell, self.slack);
             let nearest = match self.slack > 0.0 {
-                true => self.corners[t].iter().map(|p| p.z).fold(f64::INFINITY, f64::min),
+                true => {
+                    let corners = self.corners[t].iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+                    corners.max(self.plane_depths(t, cell)[0])
+                }
                 false => part.iter().map(|p| p.z).fold(f64::INFINITY, f64::min),
             };
             if nearest < self.view.camera.near_m * (1.0 + self.slack) {
                 return None;
             }
             let deepest = part.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
-            far = far.max(if self.clipped { deepest } else { self.plane_depth(t, cell) });
+            far = far.max(if self.clipped { deepest } else { self.plane_depths(t, cell)[1] });
             let c = self.scene.corners(t as u32).map(key);
             for k in 0..3 {
                 let ends = [self.corners[t][(k + 1) % 3], self.corners[t][(k + 2) % 3]];
