@@ -84,12 +84,34 @@ const SKIPPED: [&str; 4] =
 /// the tests before them matter little.
 const BEFORE_HIDING: [&str; 3] = ["none", "frustum", "frustum+back_face:arithmetic=filtered"];
 
+/// Structures that meet such walks: those walks are slow beside the others, and of variants
+/// that differ in shape alone one will do. All tests on the first, one on each of the rest.
+const UNDER_HIDING: [&str; 12] = [
+    "bvh:leaf_size=16",
+    "list:leaf_size=7",
+    "octree:depth=4,leaf_limit=16",
+    "octree:depth=3,policy=R,root=cube",
+    "octree:depth=3,policy=S,root=aabb",
+    "octree:depth=3,policy=E,root=aabb",
+    "portal_octree:depth=3,planes=walls",
+    "bsp:min_leaf=40,layout=wide",
+    "uniform_grid:density=0.5,policy=R,layout=rows",
+    "irregular_grid:nx=6,ny=6,nz=3,policy=S",
+    "nested_grid:density=0.5,leaf_limit=20",
+    "kd_tree:leaf_size=24",
+];
+
 /// Every culling with every walk over the structure, then the skipping ones, then those
 /// that leave out what is hidden, as the registry has them.
 fn methods(structure: &str) -> Vec<(&'static str, &'static str)> {
     let all = CULLINGS.into_iter().flat_map(|c| walks(structure).iter().map(move |w| (c, *w)));
     let skipping = SKIPPED.into_iter().flat_map(|c| SKIPPING.map(|w| (c, w)));
-    let hiding = hiding_walks().into_iter().flat_map(|w| BEFORE_HIDING.map(|c| (c, w)));
+    let before = match UNDER_HIDING.iter().position(|s| *s == structure) {
+        None => &[],
+        Some(0) => &BEFORE_HIDING[..],
+        Some(i) => &BEFORE_HIDING[i % 3..][..1],
+    };
+    let hiding = hiding_walks().into_iter().flat_map(|w| before.iter().map(move |c| (*c, w)));
     all.chain(skipping).chain(hiding).collect()
 }
 
@@ -191,6 +213,7 @@ fn all_pairs_face_the_oracle(scene: &Scene, camera: &Camera, poses: &[Pose], acc
 
 #[test]
 fn every_structure_x_culling_pair_faces_the_oracle() {
+    assert!(UNDER_HIDING.iter().all(|s| structures().iter().any(|known| known == s)));
     let pairs: usize = structures().iter().map(|s| methods(s).len()).sum();
     let around = DVec3::new(2.0e6, -1.0e6, 300.0);
     for (spec, offset) in [("rooms", DVec3::ZERO), ("blocks", around)] {

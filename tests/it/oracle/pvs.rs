@@ -24,7 +24,7 @@ const STRUCTURES: [&str; 3] = ["bvh", "octree", "portal_octree"];
 
 fn accuracy() -> Accuracy {
     let thorough = std::env::var_os("CULLMARK_THOROUGH").is_some_and(|v| v != "0");
-    let (frames, witness_rays) = if thorough { (40, 8) } else { (4, 2) };
+    let (frames, witness_rays) = if thorough { (40, 8) } else { (3, 2) };
     Accuracy { frames, width_px: 960, height_px: 540, samples: 1, witness_rays, hiding_cells: 0 }
 }
 
@@ -168,7 +168,8 @@ fn second_judge(
             }
             found.excluded += left.count();
             for method in &mut methods {
-                views.iter().for_each(|v| method.cull(&built, v));
+                let remembered = if method.walk.remembers() { 0 } else { views.len() - 1 };
+                views[remembered..].iter().for_each(|v| method.cull(&built, v));
                 method.count(&built, &left);
             }
         }
