@@ -43,6 +43,14 @@ fn parameters_of_one_structure_do_not_multiply_the_others() {
 }
 
 #[test]
+fn what_has_an_effect_beside_another_value_alone_may_be_a_list_there() {
+    let m = matrix(
+        "[matrix]\nscene = [\"a\"]\nculling = [\"none\"]\nstructure = [\"octree\"]\nwalk = [{ kind = \"chc\", backend = \"latency\", latency_us = [0, 10, 100] }]",
+    );
+    assert_eq!(m.runs.iter().map(|r| r.walk.int("latency_us")).collect::<Vec<_>>(), [0, 10, 100]);
+}
+
+#[test]
 fn ranges_round_to_whole_numbers_and_repeat_none() {
     let m = matrix(
         "[matrix]\nscene = [\"a\"]\nculling = [\"none\"]\nstructure = [{ kind = \"octree\", depth = [{ from = 2, to = 4, steps = 9 }, 7] }]",
