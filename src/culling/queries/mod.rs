@@ -111,6 +111,12 @@ pub(super) const QUERY_NS: Param = Param {
     about: "what a query costs the CPU on the virtual clock; the GPU half as much",
 };
 
+pub(super) const SORTED: Param = Param {
+    name: "sorted",
+    default: Allowed::Only { with: "backend", is: &["immediate"], of: &Allowed::Bool(false) },
+    about: "all is submitted at the end of the frame and by position, so that neighbours merge; the queries need no GPU",
+};
+
 pub(super) const WIDTH_PX: Param = Param {
     name: "width_px",
     default: Allowed::Int { value: 960, min: 1, max: 8192 },
