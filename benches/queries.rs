@@ -75,6 +75,7 @@ fn main() {
                 "chc_pp:d_max=0",
                 "chc_pp:multiqueries=false",
                 "chc:auto=true",
+                "chc_pp:sorted=true",
             ] {
                 line(more, &run(&scene, &h, &poses, more, true), poses.len(), &[]);
             }

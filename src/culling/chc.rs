@@ -42,6 +42,7 @@ pub const ENTRY: Entry<dyn Walk> = Entry {
         queries::N_VP,
         queries::OCCLUDER_PX,
         queries::QUERY_NS,
+        queries::SORTED,
         Param {
             name: "stall",
             default: Allowed::Choice(&["wait", "draw"]),

@@ -90,6 +90,7 @@ pub const ENTRY: Entry<dyn Walk> = Entry {
             default: Allowed::Int { value: 1, min: 0, max: i64::MAX },
             about: "of the random numbers of frames",
         },
+        queries::SORTED,
         Param {
             name: "v_queue",
             default: Allowed::Bool(true),

@@ -59,6 +59,16 @@ impl DrawList {
         }
     }
 
+    /// In order of positions, so that all neighbours merge.
+    pub fn sort(&mut self) {
+        let mut before = std::mem::replace(&mut self.ranges, std::mem::take(&mut self.spare));
+        self.ranges.clear();
+        self.stamp = 0;
+        before.sort_unstable();
+        before.iter().for_each(|(first, end)| self.push(*first, *end));
+        self.spare = before;
+    }
+
     /// Entries submitted, duplicates included.
     pub fn entry_count(&self) -> u64 {
         self.ranges.iter().map(|(a, b)| u64::from(b - a)).sum()

@@ -28,6 +28,7 @@ pub const ENTRY: Entry<dyn Walk> = Entry {
         queries::N_VP,
         queries::OCCLUDER_PX,
         queries::QUERY_NS,
+        queries::SORTED,
         queries::WIDTH_PX,
         STILL,
         WHOLE_BELOW,

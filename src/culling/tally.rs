@@ -78,8 +78,8 @@ counters! {
     nodes_occluded: "nodes",
     entries_occluded: "entries",
     /// On the virtual clock: waiting for answers, and the whole frame.
-    stall_ns: "ns",
-    virtual_ns: "ns",
+    stall_ns: "virtual ns",
+    virtual_ns: "virtual ns",
     /// Frames without queries because they did not pay.
     frames_off: "frames",
     /// Polygons whose shadows make an occlusion tree, and the planes that it has.

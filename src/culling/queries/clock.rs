@@ -23,10 +23,11 @@ const BOX_INDICES: f64 = 36.0;
 /// machines of docs/PERFORMANCE.md.
 pub const NODE_NS: f64 = 50.0;
 
-/// The software depth buffer at 960 x 540, one thread: an occluder triangle, a box. Fitted
-/// to `cargo bench --bench queries` on `rooms` (octree, nested grid, BVH).
-const SOFTWARE_OCCLUDER_NS: f64 = 75.0;
-const SOFTWARE_BOX_NS: f64 = 375.0;
+/// The software depth buffer at 960 x 540, one thread: an occluder triangle, a box. From
+/// `cargo bench --bench queries`, within a factor of two on `rooms` and Sponza; triangles
+/// cost more the larger they are and the fewer are drawn at once.
+const SOFTWARE_OCCLUDER_NS: f64 = 25.0;
+const SOFTWARE_BOX_NS: f64 = 400.0;
 
 /// What work costs; nanoseconds a piece.
 #[derive(Debug, Clone, Copy, PartialEq)]

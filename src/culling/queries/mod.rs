@@ -103,6 +103,12 @@ pub(super) const QUERY_NS: Param = Param {
     about: "what a query costs the CPU on the virtual clock; the GPU half as much",
 };
 
+pub(super) const SORTED: Param = Param {
+    name: "sorted",
+    default: Allowed::Only { with: "backend", is: &["immediate"], of: &Allowed::Bool(false) },
+    about: "all is submitted at the end of the frame and by position, so that neighbours merge; the queries need no GPU",
+};
+
 /// The back end that a resolved spec asks for.
 pub(super) fn backend(spec: &Spec) -> Box<dyn Backend> {
     let settings = settings_of(spec);

@@ -33,6 +33,8 @@ pub struct Occlusion<O> {
     n_vp: u32,
     skipping: Skipping,
     payback: Option<Payback>,
+    /// Submits at the end, by position.
+    sorted: bool,
     plain: DepthFirst,
     boxes: Vec<Box32>,
 }
@@ -48,6 +50,7 @@ impl<O: Order> Occlusion<O> {
             n_vp: spec.int("n_vp") as u32,
             skipping: Skipping::new(spec),
             payback: spec.bool("auto").then(|| Payback::new(n_av)),
+            sorted: spec.bool("sorted"),
             plain: DepthFirst::default(),
             boxes: Vec::new(),
         }
@@ -138,10 +141,15 @@ impl<O: Order> Walk for Occlusion<O> {
             perspective: view.is_perspective(),
             n_vp: self.n_vp,
             hidden_calls: 0,
+            sorted: self.sorted,
         };
         stage.roots();
         self.order.run(&mut stage);
         let hidden_calls = stage.hidden_calls;
+        if self.sorted {
+            out.sort();
+            self.backend.draw(0, 0, out.draw_calls(hierarchy) as u32, 0.0);
+        }
         let times = self.backend.times();
         tally.virtual_ns += times.virtual_ns;
         tally.stall_ns += times.stall_ns;
@@ -168,6 +176,7 @@ pub struct Stage<'a> {
     perspective: bool,
     n_vp: u32,
     hidden_calls: u64,
+    sorted: bool,
 }
 
 /// A range to be drawn, none of it nearer than so.
@@ -241,7 +250,7 @@ impl Stage<'_> {
             return;
         }
         self.out.push(first, end);
-        let calls = self.hierarchy.material_runs(first, end);
+        let calls = if self.sorted { 0 } else { self.hierarchy.material_runs(first, end) };
         self.tally.occluders_drawn += u64::from(self.backend.draw(first, end, calls, distance_m));
     }
 

@@ -27,7 +27,7 @@ impl Structure for Built {
 /// Walks at the samples of [`ACCURACY`], without and with all that changes their order.
 pub const WALKS: [&str; 6] = [
     "nested_query",
-    "nested_query:occluder_px=8,coverage=inner,auto=true",
+    "nested_query:occluder_px=8,coverage=inner,auto=true,sorted=true",
     "chc",
     "chc:coverage=inner,n_av=3",
     "chc:backend=latency,latency_us=20,occluder_px=3",
@@ -291,6 +291,27 @@ fn queries_that_do_not_pay_rest_and_those_that_do_go_on() {
         let ((_, work), _) = of(&wall, ahead(), "frustum");
         assert_eq!(sum(&work).frames_off, 0, "{walk}");
     }
+}
+
+#[test]
+fn a_sorted_list_holds_the_same_in_fewer_calls() {
+    let scene = scene("rooms");
+    let h = build("octree:depth=4", &scene);
+    let poses = way(&scene, 8, 0.1);
+    for walk in ["nested_query", "chc", "chc_pp"] {
+        let run = |walk: &str| pass(&mut setup(&scene, &h, &Camera::default(), &poses, "frustum", &small(walk)));
+        let ((lists, work), (sorted, cheaper)) = (run(walk), run(&format!("{walk}:sorted=true")));
+        for (n, (list, sorted)) in lists.iter().zip(&sorted).enumerate() {
+            assert_eq!(triangles(&h, list), triangles(&h, sorted), "{walk}");
+            assert!(sorted.ranges.windows(2).all(|w| w[0].1 < w[1].0), "{walk}: merged and ascending");
+            assert!(cheaper[n].draw_calls <= work[n].draw_calls);
+        }
+        let calls = |work: &[FrameWork]| work.iter().map(|w| w.draw_calls).sum::<u64>();
+        assert!(calls(&cheaper) < calls(&work), "{walk}");
+        assert!(sum(&cheaper).virtual_ns < sum(&work).virtual_ns, "{walk}");
+    }
+    let late = make_walk(&Spec::parse("chc:backend=latency,sorted=true").unwrap()).err().unwrap();
+    assert!(late.to_string().contains("no effect with `backend=latency`"), "{late}");
 }
 
 #[test]
