@@ -67,6 +67,8 @@ pub trait Lanes: Copy {
     unsafe fn least_i(a: Self::I) -> i32;
     unsafe fn greatest_i(a: Self::I) -> i32;
 
+    /// Says that what is there will be wanted soon.
+    unsafe fn prefetch<T>(at: *const T);
     /// Raises the line at the pixels of `cover` to `code`; those outside of `known` were 0.
     /// Returns the least of the line if `cover` and `known` are all pixels.
     unsafe fn raise(line: *mut u16, known: u32, cover: u32, code: u16) -> u16;

@@ -122,10 +122,17 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
+    unsafe fn prefetch<T>(at: *const T) {
+        // SAFETY: a prefetch faults nowhere.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(at.cast()) }
+    }
+
+    #[inline(always)]
     unsafe fn raise(line: *mut u16, known: u32, cover: u32, code: u16) -> u16 {
         // SAFETY: callers have the features; a line is 64 bytes, aligned so.
         unsafe {
-            let old = _mm512_maskz_mov_epi16(known, _mm512_load_si512(line.cast()));
+            // Volatile, or this becomes a masked load, which waits for stores to the line to retire.
+            let old = _mm512_maskz_mov_epi16(known, line.cast::<__m512i>().read_volatile());
             let new = _mm512_mask_max_epu16(old, cover, old, _mm512_set1_epi16(code as i16));
             _mm512_store_si512(line.cast(), new);
             if known | cover != !0 {

@@ -149,6 +149,7 @@ impl Lanes for Scalar {
         a.into_iter().fold(i32::MIN, i32::max)
     }
 
+    unsafe fn prefetch<T>(_: *const T) {}
     unsafe fn raise(line: *mut u16, known: u32, cover: u32, code: u16) -> u16 {
         let mut least = u16::MAX;
         for i in 0..32 {

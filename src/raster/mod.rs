@@ -27,6 +27,7 @@ mod large;
 pub mod occluders;
 pub mod plain;
 pub mod project;
+pub mod pyramid;
 mod queue;
 mod set_up;
 mod tiles;
@@ -37,6 +38,7 @@ pub use occluders::{Kind, Occluders};
 
 use crate::math::{Box32, DVec3, View};
 use project::{Place, Rect, Screen, f32_above, f32_below};
+use pyramid::Pyramid;
 use queue::Queue;
 use tiles::Tiles;
 use vertices::Lens;
@@ -186,6 +188,12 @@ impl DepthBuffer {
             _ => f32_below(f64::from(key) - ahead),
         };
         self.tiles.image(base).into_iter().map(nearness).collect()
+    }
+
+    /// A pyramid over all that was drawn.
+    pub fn pyramid(&mut self) -> Pyramid {
+        let image = self.image();
+        Pyramid::new(&self.screen, &image)
     }
 
     pub fn bytes(&self) -> usize {

@@ -6,7 +6,7 @@
 //! side, each going through the bins of all chunks in order. A subtile thus sees the same
 //! triangles in the same order as on one thread.
 
-use super::kernel::{self, Chunk, Kernel, Sink};
+use super::kernel::{self, Chunk, Kernel, Scratch, Sink};
 use super::occluders::{Occluders, Store};
 use super::tiles::Tiles;
 use super::vertices::Lens;
@@ -15,16 +15,17 @@ use std::sync::Arc;
 
 /// Positions of a chunk, chunks of a round, and how many positions are worth sharing.
 const CHUNK: u32 = 1024;
-const ROUND: usize = 32;
+const ROUND: usize = 16;
 const WORTH: u32 = 4 * CHUNK;
 /// Strips of a group.
-const GROUP: usize = 2;
+const GROUP: usize = 4;
 
 #[derive(Debug, Default)]
 pub struct Queue {
     waiting: Vec<(Arc<Store>, u32, u32)>,
     positions: u32,
-    chunks: Vec<Chunk>,
+    chunks: Vec<(Chunk, Scratch)>,
+    scratch: Scratch,
 }
 
 impl Queue {
@@ -35,15 +36,15 @@ impl Queue {
 
     pub fn bytes(&self) -> usize {
         let of = |c: &Chunk| {
-            size_of_val(&c.blocks[..]) + size_of_val(&c.larges[..]) + c.bins.iter().map(|b| 4 * b.len()).sum::<usize>()
+            size_of_val(&c.smalls[..]) + size_of_val(&c.larges[..]) + c.bins.iter().map(|b| 4 * b.len()).sum::<usize>()
         };
-        self.chunks.iter().map(of).sum()
+        self.chunks.iter().map(|(c, _)| of(c) + size_of::<Scratch>()).sum()
     }
 
     pub fn draw(&mut self, kernel: Kernel, lens: &Lens, tiles: &mut Tiles, what: &Occluders, first: u32, end: u32) {
         if rayon::current_num_threads() < 2 {
             self.flush(kernel, lens, tiles);
-            at_once(kernel, lens, tiles, what.store(), first, end);
+            at_once(kernel, lens, tiles, &mut self.scratch, what.store(), first, end);
             return;
         }
         match self.waiting.last_mut() {
@@ -62,7 +63,7 @@ impl Queue {
         }
         if self.positions < WORTH || rayon::current_num_threads() < 2 {
             for (store, first, end) in self.waiting.drain(..) {
-                at_once(kernel, lens, tiles, &store, first, end);
+                at_once(kernel, lens, tiles, &mut self.scratch, &store, first, end);
             }
         } else {
             for round in pieces(&self.waiting).chunks(ROUND) {
@@ -96,23 +97,26 @@ fn pieces(waiting: &[(Arc<Store>, u32, u32)]) -> Vec<Piece<'_>> {
     pieces
 }
 
-fn at_once(kernel: Kernel, lens: &Lens, tiles: &mut Tiles, store: &Store, first: u32, end: u32) {
+fn at_once(kernel: Kernel, lens: &Lens, tiles: &mut Tiles, scratch: &mut Scratch, store: &Store, first: u32, end: u32) {
     let view = tiles.view(lens.code_base);
     // SAFETY: the buffer is ours alone meanwhile, and was made for the lens's image.
-    unsafe { kernel::draw(kernel, lens, store, first, end, &mut Sink::Tiles(&view)) }
+    unsafe { kernel::draw(kernel, lens, store, first, end, scratch, &mut Sink::Tiles(&view)) }
 }
 
-fn share(chunks: &mut Vec<Chunk>, kernel: Kernel, lens: &Lens, tiles: &mut Tiles, pieces: &[Piece<'_>]) {
+fn share(chunks: &mut Vec<(Chunk, Scratch)>, kernel: Kernel, lens: &Lens, tiles: &mut Tiles, pieces: &[Piece<'_>]) {
     let groups = tiles.strips.div_ceil(GROUP);
     if chunks.len() < pieces.len() {
-        chunks.resize_with(pieces.len(), Chunk::default);
+        chunks.resize_with(pieces.len(), Default::default);
     }
     let chunks = &mut chunks[..pieces.len()];
-    chunks.par_iter_mut().zip(pieces).with_max_len(1).for_each(|(chunk, piece)| {
+    chunks.par_iter_mut().zip(pieces).with_max_len(1).for_each(|((chunk, scratch), piece)| {
         chunk.clear(groups);
         for (store, first, end) in piece {
             // SAFETY: nothing is drawn here.
-            unsafe { kernel::draw(kernel, lens, store, *first, *end, &mut Sink::Chunk(chunk, 32 * GROUP as i32)) }
+            unsafe {
+                let mut sink = Sink::Chunk(chunk, 32 * GROUP as i32);
+                kernel::draw(kernel, lens, store, *first, *end, scratch, &mut sink);
+            }
         }
     });
     let all = tiles.view(lens.code_base);
@@ -120,7 +124,7 @@ fn share(chunks: &mut Vec<Chunk>, kernel: Kernel, lens: &Lens, tiles: &mut Tiles
     (0..groups).into_par_iter().with_max_len(1).for_each(|g| {
         let mut view = all;
         (view.first, view.end) = ((g * GROUP) as i32, all.end.min((g * GROUP + GROUP) as i32));
-        for chunk in chunks {
+        for (chunk, _) in chunks {
             // SAFETY: each group has strips of its own, and only these are drawn to.
             unsafe { kernel::replay(kernel, &view, chunk, g) }
         }

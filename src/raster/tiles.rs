@@ -120,18 +120,43 @@ unsafe impl Send for TilesView {}
 unsafe impl Sync for TilesView {}
 
 impl TilesView {
-    /// Raises N rows of a strip from the row of subtiles `y / 4` on to `z` where `rows` are covered.
+    /// Prefetches the first two by two subtiles of a rectangle.
+    ///
+    /// # Safety
+    /// The kernel's features are there.
+    #[inline(always)]
+    pub unsafe fn prefetch<L: Lanes>(&self, x0: i32, y0: i32) {
+        let at = (x0 >> 5) as usize * self.per_strip + (y0 as usize & !3) + (x0 as usize >> 3 & 3);
+        // SAFETY: only addresses are made, and they may be wrong.
+        unsafe {
+            L::prefetch(self.lines.wrapping_add(at));
+            L::prefetch(self.lines.wrapping_add(at + 1));
+            L::prefetch(self.lines.wrapping_add(at + 4));
+            L::prefetch(self.lines.wrapping_add(at + 5));
+            L::prefetch(self.floors.wrapping_add(at));
+            L::prefetch(self.known.wrapping_add(at));
+        }
+    }
+
+    /// Raises N rows of a strip, from the row of subtiles `y / 4` on, to `z` at pixels `from..to`
+    /// less `skipped`.
     ///
     /// # Safety
     /// The strip is one of the view's, `y` a row of the image; the kernel's features are there.
     #[inline(always)]
-    pub unsafe fn raise<L: Lanes>(&self, strip: i32, y: i32, cover: L::I, z: L::F) {
+    pub unsafe fn raise<L: Lanes>(&self, strip: i32, y: i32, from: L::I, to: L::I, skipped: i32, z: L::F) {
         // SAFETY: as the caller promises; rows past the image are spare.
         unsafe {
             let at = strip as usize * self.per_strip + (y as usize & !3);
             let floors = self.floors.add(at);
             let floor = L::load_f(floors);
-            let nearer = L::bits(L::gt(z, floor)) & !L::bits(L::eq_i(cover, L::i(0)));
+            let nearer = L::bits(L::gt(z, floor));
+            if nearer == 0 {
+                return;
+            }
+            let skipped = L::i(skipped);
+            let cover = L::to_subtiles(L::run(L::sub_i(from, skipped), L::sub_i(to, skipped)));
+            let nearer = nearer & !L::bits(L::eq_i(cover, L::i(0)));
             if nearer == 0 {
                 return;
             }
