@@ -8,14 +8,14 @@ use super::tiles::TilesView;
 /// Draws the part of a small triangle that lies in the view's strips.
 ///
 /// # Safety
-/// The block's lane was set up for this image; the kernel's features are there.
+/// It was set up for this image; the kernel's features are there.
 #[inline(always)]
-pub unsafe fn small<L: Lanes>(t: &TilesView, b: &Block, lane: usize) {
+pub unsafe fn small<L: Lanes>(t: &TilesView, b: &impl SetUp) {
     // SAFETY: as the caller promises.
     unsafe {
-        let (x0, x1, y0, y1) = (b.x0[lane], b.x1[lane], b.y0[lane], b.y1[lane]);
+        let [x0, x1, y0, y1] = b.rect();
         let (first, last) = ((x0 >> 5).max(t.first), ((x1 - 1) >> 5).min(t.end - 1));
-        let of = |column: usize| L::f(b.f[column][lane]);
+        let of = |column: usize| L::f(b.f(column));
         let (left, left_step, left2, left2_step) = (of(LEFT), of(LEFT_STEP), of(LEFT2), of(LEFT2_STEP));
         let (right, right_step, right2, right2_step) = (of(RIGHT), of(RIGHT_STEP), of(RIGHT2), of(RIGHT2_STEP));
         let (across, zero) = (of(ACROSS), L::f(0.0));
@@ -31,12 +31,11 @@ pub unsafe fn small<L: Lanes>(t: &TilesView, b: &Block, lane: usize) {
             let to = L::truncate(L::max(L::min(to, across), zero));
             let to = L::pick_i(L::rows(y0 - y, y1 - y), to, L::i(-4096));
             let nearness = L::add(near, L::mul(near_down, L::to_f(L::add_i(L::down(), L::i((y - top) >> 2)))));
+            let mut column = L::add(L::to_f(L::across()), L::f(((first - (x0 >> 5)) * 4) as f32));
             for strip in first..=last {
-                let off = L::i(strip * 32 - x0);
-                let rows = L::run(L::sub_i(from, off), L::sub_i(to, off));
-                let column = L::to_f(L::add_i(L::across(), L::i((strip - (x0 >> 5)) * 4)));
                 let z = L::max(L::add(nearness, L::mul(near_across, column)), least);
-                t.raise::<L>(strip, y, L::to_subtiles(rows), z);
+                column = L::add(column, L::f(4.0));
+                t.raise::<L>(strip, y, from, to, strip * 32 - x0, z);
             }
             y += L::N as i32;
         }
@@ -70,12 +69,11 @@ pub unsafe fn large<L: Lanes>(t: &TilesView, g: &Large) {
             let nearness = L::add(near, L::mul(near_down, L::to_f(L::add_i(L::down(), L::i((y - top) >> 2)))));
             let first = (L::least_i(from) >> 5).max(t.first);
             let last = ((L::greatest_i(to) - 1) >> 5).min(t.end - 1);
+            let mut column = L::add(L::to_f(L::across()), L::f(((first - (g.x0 >> 5)) * 4) as f32));
             for strip in first..=last {
-                let off = L::i(strip * 32);
-                let rows = L::run(L::sub_i(from, off), L::sub_i(to, off));
-                let column = L::to_f(L::add_i(L::across(), L::i((strip - (g.x0 >> 5)) * 4)));
                 let z = L::max(L::add(nearness, L::mul(near_across, column)), least);
-                t.raise::<L>(strip, y, L::to_subtiles(rows), z);
+                column = L::add(column, L::f(4.0));
+                t.raise::<L>(strip, y, from, to, strip * 32, z);
             }
             y += L::N as i32;
         }

@@ -1,6 +1,6 @@
 //! One rasteriser, three instruction sets: what is compiled for each, and the choice.
 
-use super::block::{Block, Corner, LANES};
+use super::block::{Alone, Block, Corner, LANES, Lane, SetUp};
 use super::fill;
 use super::lanes::Lanes;
 use super::lanes_scalar::Scalar;
@@ -40,21 +40,22 @@ impl Kernel {
     }
 }
 
-/// What is set up of some positions, to be drawn strip by strip: `item` names a block and a
-/// lane, or a large polygon, in the order of positions.
+/// What is set up of some positions, to be drawn strip by strip.
 #[derive(Debug, Default)]
 pub struct Chunk {
-    pub blocks: Vec<Block>,
+    pub smalls: Vec<Alone>,
     pub larges: Vec<Large>,
-    /// For each group of strips.
+    /// Triangles in the order of positions, for each group of strips: `LARGE` marks large ones.
     pub bins: Vec<Vec<u32>>,
 }
 
 const LARGE: u32 = 1 << 31;
+/// So many triangles before it is drawn, one's part of the buffer is fetched.
+const AHEAD: usize = 8;
 
 impl Chunk {
     pub fn clear(&mut self, groups: usize) {
-        self.blocks.clear();
+        self.smalls.clear();
         self.larges.clear();
         self.bins.resize_with(groups, Vec::new);
         self.bins.iter_mut().for_each(Vec::clear);
@@ -67,6 +68,19 @@ impl Chunk {
     }
 }
 
+/// Room to set up in.
+#[derive(Debug)]
+pub struct Scratch {
+    corners: [Corner; 256],
+    blocks: [Block; 2],
+}
+
+impl Default for Scratch {
+    fn default() -> Scratch {
+        Scratch { corners: [Corner::default(); 256], blocks: [Block::EMPTY; 2] }
+    }
+}
+
 /// Where triangles go that are set up.
 pub enum Sink<'a> {
     /// To the buffer, at once.
@@ -76,40 +90,75 @@ pub enum Sink<'a> {
 }
 
 #[inline(always)]
-unsafe fn draw_in<L: Lanes>(lens: &Lens, store: &Store, first: u32, end: u32, sink: &mut Sink) {
-    let mut corners = [Corner::default(); 256];
-    let mut block = Block::EMPTY;
+unsafe fn draw_in<L: Lanes>(lens: &Lens, store: &Store, first: u32, end: u32, scratch: &mut Scratch, sink: &mut Sink) {
+    let Scratch { corners, blocks } = scratch;
+    // A block is drawn when the next one is set up: until then the buffer's lines are on their way.
+    let (mut current, mut waiting) = (0, 0);
     let (mut p, mut b) = (first, store.batch_of(first));
-    while p < end {
-        let (batch, range) = store.batch(b);
-        let stop = range.end.min(end);
-        let view = BatchView::new(lens, &batch);
-        // SAFETY: the caller has the features; a batch's words name its corners, and
-        // spare ones follow the last.
-        unsafe {
+    // SAFETY: the caller has the features; a batch's words name its corners, and spare ones
+    // follow the last.
+    unsafe {
+        while p < end {
+            let (batch, range) = store.batch(b);
+            let stop = range.end.min(end);
+            let view = BatchView::new(lens, &batch);
             L::project(&view, &batch, &mut corners[..batch.x.len()]);
             while p < stop {
                 let (mut small, mut other) = (0, 0);
+                let block = &mut blocks[current];
                 let mut lane = 0;
                 while lane < LANES && p + (lane as u32) < stop {
                     let live = between(0, (stop - p - lane as u32).min(L::N as u32));
                     let words = store.words().as_ptr().add(p as usize + lane);
-                    let made = set_up::<L>(&view, corners.as_ptr(), words, live, &mut block, lane);
+                    let made = set_up::<L>(&view, corners.as_ptr(), words, live, block, lane);
                     small |= made.small << lane;
                     other |= made.other << lane;
                     lane += L::N;
                 }
                 if small | other != 0 {
-                    emit::<L>(lens, store, &view, b, p, &block, small, other, sink);
+                    if let Sink::Tiles(t) = sink {
+                        prefetch::<L>(t, block, small);
+                        draw_block::<L>(t, &blocks[1 - current], waiting);
+                        (waiting, current) = (small, 1 - current);
+                    }
+                    if other != 0 || matches!(sink, Sink::Chunk(..)) {
+                        let block = if let Sink::Tiles(_) = sink { 1 - current } else { current };
+                        emit::<L>(lens, store, &view, b, p, &blocks[block], small, other, sink);
+                        waiting = 0;
+                    }
                 }
                 p += LANES as u32;
             }
+            p = stop;
+            b += 1;
         }
-        p = stop;
-        b += 1;
+        if let Sink::Tiles(t) = sink {
+            draw_block::<L>(t, &blocks[1 - current], waiting);
+        }
     }
 }
 
+#[inline(always)]
+unsafe fn prefetch<L: Lanes>(t: &TilesView, block: &Block, mut lanes: u32) {
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize & (LANES - 1);
+        lanes &= lanes - 1;
+        // SAFETY: the caller has the features.
+        unsafe { t.prefetch::<L>(block.x0[lane], block.y0[lane]) };
+    }
+}
+
+#[inline(always)]
+unsafe fn draw_block<L: Lanes>(t: &TilesView, block: &Block, mut lanes: u32) {
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes - 1;
+        // SAFETY: the lane was set up; the caller has the features.
+        unsafe { fill::small::<L>(t, &Lane(block, lane)) };
+    }
+}
+
+/// The triangles of a block in order, small ones and others.
 #[inline(always)]
 unsafe fn emit<L: Lanes>(
     lens: &Lens,
@@ -122,11 +171,6 @@ unsafe fn emit<L: Lanes>(
     other: u32,
     sink: &mut Sink,
 ) {
-    if small != 0
-        && let Sink::Chunk(chunk, _) = sink
-    {
-        chunk.blocks.push(*block);
-    }
     let mut rest = small | other;
     while rest != 0 {
         let lane = rest.trailing_zeros() as usize & (LANES - 1);
@@ -134,10 +178,10 @@ unsafe fn emit<L: Lanes>(
         if small >> lane & 1 != 0 {
             match sink {
                 // SAFETY: the lane was just set up.
-                Sink::Tiles(t) => unsafe { fill::small::<L>(t, block, lane) },
+                Sink::Tiles(t) => unsafe { fill::small::<L>(t, &Lane(block, lane)) },
                 Sink::Chunk(chunk, group_px) => {
-                    let item = (chunk.blocks.len() - 1) * LANES + lane;
-                    chunk.push(item as u32, block.x0[lane], block.x1[lane], *group_px);
+                    chunk.smalls.push(Alone::new(block, lane));
+                    chunk.push(chunk.smalls.len() as u32 - 1, block.x0[lane], block.x1[lane], *group_px);
                 }
             }
             continue;
@@ -158,13 +202,20 @@ unsafe fn emit<L: Lanes>(
 
 #[inline(always)]
 unsafe fn replay_in<L: Lanes>(tiles: &TilesView, chunk: &Chunk, group: usize) {
-    for item in &chunk.bins[group] {
+    let bin = &chunk.bins[group];
+    for (i, item) in bin.iter().enumerate() {
         // SAFETY: as for `emit`.
         unsafe {
+            if let Some(item) = bin.get(i + AHEAD)
+                && item & LARGE == 0
+            {
+                let [x0, _, y0, _] = chunk.smalls[*item as usize].rect();
+                tiles.prefetch::<L>(x0.max(tiles.first * 32), y0);
+            }
             if item & LARGE != 0 {
                 fill::large::<L>(tiles, &chunk.larges[(item & !LARGE) as usize]);
             } else {
-                fill::small::<L>(tiles, &chunk.blocks[*item as usize / LANES], *item as usize % LANES);
+                fill::small::<L>(tiles, &chunk.smalls[*item as usize]);
             }
         }
     }
@@ -214,7 +265,7 @@ unsafe fn count_in<L: Lanes>(tiles: &TilesView, rect: Rect, nearness: f32, any: 
 
 kernels! {
     /// Sets up positions `first..end` of a store, in order, into the sink.
-    draw = draw_in(lens: &Lens, store: &Store, first: u32, end: u32, sink: &mut Sink) -> ();
+    draw = draw_in(lens: &Lens, store: &Store, first: u32, end: u32, scratch: &mut Scratch, sink: &mut Sink) -> ();
     /// Draws what a chunk holds for a group of strips.
     replay = replay_in(tiles: &TilesView, chunk: &Chunk, group: usize) -> ();
     /// See [`TilesView::count`].

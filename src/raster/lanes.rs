@@ -5,6 +5,7 @@
 //! operation once, in the same order, so their buffers are equal bit by bit.
 
 use super::block::Corner;
+use super::code::Codes;
 use super::vertices::{Batch, BatchView};
 
 /// One row of samples for each lane; every four lanes are a row of four subtiles as well.
@@ -61,12 +62,14 @@ pub trait Lanes: Copy {
     unsafe fn run(from: Self::I, to: Self::I) -> Self::I;
     /// Rows of 32 pixels to subtiles of 8 x 4: in each four lanes the bytes are transposed.
     unsafe fn to_subtiles(rows: Self::I) -> Self::I;
-    /// Codes of nearness (see `code`): the upper 20 bits less `base`, clamped to 16 bits.
-    unsafe fn codes(z: Self::F, base: Self::I) -> Self::I;
+    /// [`Codes::of`].
+    unsafe fn codes(z: Self::F, codes: Codes) -> Self::I;
     /// Least and greatest lane.
     unsafe fn least_i(a: Self::I) -> i32;
     unsafe fn greatest_i(a: Self::I) -> i32;
 
+    /// Says that what is there will be wanted soon.
+    unsafe fn prefetch<T>(at: *const T);
     /// Raises the line at the pixels of `cover` to `code`; those outside of `known` were 0.
     /// Returns the least of the line if `cover` and `known` are all pixels.
     unsafe fn raise(line: *mut u16, known: u32, cover: u32, code: u16) -> u16;

@@ -1,6 +1,7 @@
 //! Eight lanes by AVX2. A line of 32 pixels is two registers.
 
 use super::block::{Corner, OFF};
+use super::code::Codes;
 use super::lanes::{Fetched, Lanes};
 use super::vertices::{Batch, BatchView, FAR, SUBPIXELS};
 use std::arch::x86_64::*;
@@ -114,10 +115,11 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn codes(z: __m256, base: __m256i) -> __m256i {
+    unsafe fn codes(z: __m256, codes: Codes) -> __m256i {
         // SAFETY: callers have the features.
         unsafe {
-            let code = _mm256_sub_epi32(_mm256_srli_epi32::<12>(_mm256_castps_si256(z)), base);
+            let upper = _mm256_srl_epi32(_mm256_castps_si256(z), _mm_cvtsi32_si128(codes.shift as i32));
+            let code = _mm256_sub_epi32(upper, _mm256_set1_epi32(codes.base));
             _mm256_min_epi32(_mm256_max_epi32(code, _mm256_setzero_si256()), _mm256_set1_epi32(65535))
         }
     }
@@ -140,6 +142,12 @@ impl Lanes for Avx2 {
             let m = _mm_max_epi32(m, _mm_shuffle_epi32::<0b01_00_11_10>(m));
             _mm_cvtsi128_si32(_mm_max_epi32(m, _mm_shuffle_epi32::<0b10_11_00_01>(m)))
         }
+    }
+
+    #[inline(always)]
+    unsafe fn prefetch<T>(at: *const T) {
+        // SAFETY: a prefetch faults nowhere.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(at.cast()) }
     }
 
     #[inline(always)]

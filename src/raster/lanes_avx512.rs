@@ -1,6 +1,7 @@
 //! Sixteen lanes by AVX-512, explicit intrinsics only. A line of 32 pixels is one register.
 
 use super::block::{Corner, OFF};
+use super::code::Codes;
 use super::lanes::{Fetched, Lanes};
 use super::vertices::{Batch, BatchView, FAR, SUBPIXELS};
 use std::arch::x86_64::*;
@@ -113,19 +114,27 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn codes(z: __m512, base: __m512i) -> __m512i {
+    unsafe fn codes(z: __m512, codes: Codes) -> __m512i {
         // SAFETY: callers have the features.
         unsafe {
-            let code = _mm512_sub_epi32(_mm512_srli_epi32::<12>(_mm512_castps_si512(z)), base);
+            let upper = _mm512_srl_epi32(_mm512_castps_si512(z), _mm_cvtsi32_si128(codes.shift as i32));
+            let code = _mm512_sub_epi32(upper, _mm512_set1_epi32(codes.base));
             _mm512_min_epi32(_mm512_max_epi32(code, _mm512_setzero_si512()), _mm512_set1_epi32(65535))
         }
+    }
+
+    #[inline(always)]
+    unsafe fn prefetch<T>(at: *const T) {
+        // SAFETY: a prefetch faults nowhere.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(at.cast()) }
     }
 
     #[inline(always)]
     unsafe fn raise(line: *mut u16, known: u32, cover: u32, code: u16) -> u16 {
         // SAFETY: callers have the features; a line is 64 bytes, aligned so.
         unsafe {
-            let old = _mm512_maskz_mov_epi16(known, _mm512_load_si512(line.cast()));
+            // Volatile, or this becomes a masked load, which waits for stores to the line to retire.
+            let old = _mm512_maskz_mov_epi16(known, line.cast::<__m512i>().read_volatile());
             let new = _mm512_mask_max_epu16(old, cover, old, _mm512_set1_epi16(code as i16));
             _mm512_store_si512(line.cast(), new);
             if known | cover != !0 {

@@ -1,6 +1,7 @@
 //! The scalar twin: eight lanes as plain arrays. It runs on every processor.
 
 use super::block::Corner;
+use super::code::Codes;
 use super::lanes::{Fetched, Lanes};
 use super::vertices::{Batch, BatchView};
 
@@ -139,8 +140,8 @@ impl Lanes for Scalar {
             |four: usize, row: usize, column: usize| (rows[4 * four + row] as u32 >> (8 * column) & 0xff) << (8 * row);
         std::array::from_fn(|i| (0..4).map(|row| byte(i / 4, row, i % 4)).sum::<u32>() as i32)
     }
-    unsafe fn codes(z: Self::F, base: Self::I) -> Self::I {
-        zip(z, base, |z, base| i32::from(super::code::of(z, base)))
+    unsafe fn codes(z: Self::F, codes: Codes) -> Self::I {
+        z.map(|z| i32::from(codes.of(z)))
     }
     unsafe fn least_i(a: Self::I) -> i32 {
         a.into_iter().fold(i32::MAX, i32::min)
@@ -149,6 +150,7 @@ impl Lanes for Scalar {
         a.into_iter().fold(i32::MIN, i32::max)
     }
 
+    unsafe fn prefetch<T>(_: *const T) {}
     unsafe fn raise(line: *mut u16, known: u32, cover: u32, code: u16) -> u16 {
         let mut least = u16::MAX;
         for i in 0..32 {

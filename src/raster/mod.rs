@@ -28,6 +28,7 @@ mod large;
 pub mod occluders;
 pub mod plain;
 pub mod project;
+pub mod pyramid;
 mod queue;
 mod set_up;
 mod tiles;
@@ -38,6 +39,7 @@ pub use occluders::{Kind, Occluders};
 
 use crate::math::{Box32, DVec3, View};
 use project::{Place, Rect, Screen, f32_above, f32_below};
+use pyramid::Pyramid;
 use queue::Queue;
 use tiles::Tiles;
 use vertices::Lens;
@@ -173,20 +175,26 @@ impl DepthBuffer {
             return all;
         }
         // SAFETY: the rectangle lies in the image, and nobody else draws.
-        unsafe { kernel::count(self.kernel, &self.tiles.view(lens.code_base), rect, key.max(0.0), any) }
+        unsafe { kernel::count(self.kernel, &self.tiles.view(lens.codes), rect, key.max(0.0), any) }
     }
 
     /// Lower bound of nearness, pixel by pixel, row-major from the top left; negative
     /// infinity where nothing was drawn.
     pub fn image(&mut self) -> Vec<f32> {
         self.flush();
-        let (base, ahead) = self.lens.as_ref().map_or((0, 0.0), |l| (l.code_base, l.ahead));
+        let (codes, ahead) = self.lens.as_ref().map_or_else(Default::default, |l| (l.codes, l.ahead));
         let nearness = |key: f32| match key {
             0.0 => f32::NEG_INFINITY,
             _ if self.screen.perspective => key,
             _ => f32_below(f64::from(key) - ahead),
         };
-        self.tiles.image(base).into_iter().map(nearness).collect()
+        self.tiles.image(codes).into_iter().map(nearness).collect()
+    }
+
+    /// A pyramid over all that was drawn.
+    pub fn pyramid(&mut self) -> Pyramid {
+        let image = self.image();
+        Pyramid::new(&self.screen, &image)
     }
 
     pub fn bytes(&self) -> usize {

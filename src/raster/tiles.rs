@@ -9,8 +9,9 @@
 //! occluders and valid only under the mask, so nothing clears them. When the mask
 //! is full its least pixel becomes the floor, and what is not above it leaves the mask.
 
+use super::code::Codes;
+use super::lanes::Lanes;
 use super::project::Rect;
-use super::{code, lanes::Lanes};
 
 pub const LINE: usize = 32;
 
@@ -76,7 +77,7 @@ impl Tiles {
         (column / 4) as usize * self.per_strip + (row * 4 + column % 4) as usize
     }
 
-    pub fn view(&mut self, code_base: i32) -> TilesView {
+    pub fn view(&mut self, codes: Codes) -> TilesView {
         TilesView {
             floors: self.floors.as_mut_ptr(),
             known: self.known.as_mut_ptr(),
@@ -84,16 +85,16 @@ impl Tiles {
             per_strip: self.per_strip,
             first: 0,
             end: self.strips as i32,
-            code_base,
+            codes,
         }
     }
 
     /// Nearness pixel by pixel, 0 where nothing was drawn.
-    pub fn image(&self, code_base: i32) -> Vec<f32> {
+    pub fn image(&self, codes: Codes) -> Vec<f32> {
         let at = |x: u32, y: u32| {
             let (i, p) = (self.index(x / 8, y / 4), y % 4 * 8 + x % 8);
             let line = if self.known[i] >> p & 1 == 0 { 0 } else { self.lines[i].0[p as usize] };
-            code::value(line, code_base).max(self.floors[i])
+            codes.value(line).max(self.floors[i])
         };
         (0..self.height).flat_map(|y| (0..self.width).map(move |x| at(x, y))).collect()
     }
@@ -112,7 +113,7 @@ pub struct TilesView {
     pub per_strip: usize,
     pub first: i32,
     pub end: i32,
-    pub code_base: i32,
+    pub codes: Codes,
 }
 
 // SAFETY: whoever makes views sees to it that those of different threads have different strips.
@@ -120,18 +121,43 @@ unsafe impl Send for TilesView {}
 unsafe impl Sync for TilesView {}
 
 impl TilesView {
-    /// Raises N rows of a strip from the row of subtiles `y / 4` on to `z` where `rows` are covered.
+    /// Prefetches the first two by two subtiles of a rectangle.
+    ///
+    /// # Safety
+    /// The kernel's features are there.
+    #[inline(always)]
+    pub unsafe fn prefetch<L: Lanes>(&self, x0: i32, y0: i32) {
+        let at = (x0 >> 5) as usize * self.per_strip + (y0 as usize & !3) + (x0 as usize >> 3 & 3);
+        // SAFETY: only addresses are made, and they may be wrong.
+        unsafe {
+            L::prefetch(self.lines.wrapping_add(at));
+            L::prefetch(self.lines.wrapping_add(at + 1));
+            L::prefetch(self.lines.wrapping_add(at + 4));
+            L::prefetch(self.lines.wrapping_add(at + 5));
+            L::prefetch(self.floors.wrapping_add(at));
+            L::prefetch(self.known.wrapping_add(at));
+        }
+    }
+
+    /// Raises N rows of a strip, from the row of subtiles `y / 4` on, to `z` at pixels `from..to`
+    /// less `skipped`.
     ///
     /// # Safety
     /// The strip is one of the view's, `y` a row of the image; the kernel's features are there.
     #[inline(always)]
-    pub unsafe fn raise<L: Lanes>(&self, strip: i32, y: i32, cover: L::I, z: L::F) {
+    pub unsafe fn raise<L: Lanes>(&self, strip: i32, y: i32, from: L::I, to: L::I, skipped: i32, z: L::F) {
         // SAFETY: as the caller promises; rows past the image are spare.
         unsafe {
             let at = strip as usize * self.per_strip + (y as usize & !3);
             let floors = self.floors.add(at);
             let floor = L::load_f(floors);
-            let nearer = L::bits(L::gt(z, floor)) & !L::bits(L::eq_i(cover, L::i(0)));
+            let nearer = L::bits(L::gt(z, floor));
+            if nearer == 0 {
+                return;
+            }
+            let skipped = L::i(skipped);
+            let cover = L::to_subtiles(L::run(L::sub_i(from, skipped), L::sub_i(to, skipped)));
+            let nearer = nearer & !L::bits(L::eq_i(cover, L::i(0)));
             if nearer == 0 {
                 return;
             }
@@ -145,7 +171,7 @@ impl TilesView {
             }
             let (mut covers, mut codes) = ([0u32; 16], [0u32; 16]);
             L::store_i(covers.as_mut_ptr().cast(), cover);
-            L::store_i(codes.as_mut_ptr().cast(), L::codes(z, L::i(self.code_base)));
+            L::store_i(codes.as_mut_ptr().cast(), L::codes(z, self.codes));
             while part != 0 {
                 let i = part.trailing_zeros() as usize & 15;
                 part &= part - 1;
@@ -153,11 +179,11 @@ impl TilesView {
                 let least = L::raise(line, *known, covers[i], codes[i] as u16);
                 *known |= covers[i];
                 if *known == !0 {
-                    let reached = code::value(least, self.code_base);
+                    let reached = self.codes.value(least);
                     if reached > *floors.add(i) {
                         *floors.add(i) = reached;
                     }
-                    *known = L::above(line, code::of(*floors.add(i), self.code_base));
+                    *known = L::above(line, self.codes.of(*floors.add(i)));
                 }
             }
         }
@@ -170,7 +196,7 @@ impl TilesView {
     /// The rectangle lies in the image; the kernel's features are there.
     #[inline(always)]
     pub unsafe fn count<L: Lanes>(&self, r: Rect, nearness: f32, any: bool) -> u32 {
-        let code = code::of(nearness, self.code_base);
+        let code = self.codes.of(nearness);
         let mut shown = 0;
         for strip in r.x0 / 32..=(r.x1 - 1) / 32 {
             let columns = between(r.x0.max(strip * 32) - strip * 32, r.x1.min(strip * 32 + 32) - strip * 32);

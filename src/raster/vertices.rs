@@ -2,6 +2,7 @@
 //! snapped to 1/65536 px. Where rounding could have moved a corner is bounded here.
 
 use super::block::{Corner, OFF};
+use super::code::Codes;
 use super::project::Screen;
 use super::{Coverage, Settings};
 use crate::math::DVec3;
@@ -29,8 +30,8 @@ pub struct Batch<'a> {
 #[derive(Debug, Clone)]
 pub struct Lens {
     pub screen: Screen,
-    /// Parallel rays: nearness is kept as `ahead - depth`, which is positive for all that
-    /// lies before this depth.
+    /// Parallel rays: nearness is kept as `ahead - depth`, which lies between the range of
+    /// depths and twice that for all that hides.
     pub ahead: f64,
     pub inner: bool,
     pub width: i32,
@@ -39,13 +40,19 @@ pub struct Lens {
     pub focal: f64,
     /// No corner of a small triangle that meets the image is farther from its centre.
     reach: f64,
-    /// See `code`.
-    pub code_base: i32,
+    pub codes: Codes,
 }
 
 impl Lens {
-    pub fn new(screen: Screen, settings: Settings, ahead: f64) -> Lens {
-        let most = if screen.perspective { 1.0 / screen.near_m } else { ahead - screen.near_m };
+    /// Of occluders of which none is farther than `farthest`.
+    pub fn new(screen: Screen, settings: Settings, farthest: f64) -> Lens {
+        let range = (farthest - screen.near_m).max(1.0);
+        let codes = if screen.perspective {
+            Codes::logarithmic((1.0 / screen.near_m) as f32)
+        } else {
+            Codes::even((range * 0.999_999) as f32)
+        };
+        let ahead = farthest + range;
         Lens {
             ahead,
             inner: settings.coverage == Coverage::Inner,
@@ -53,7 +60,7 @@ impl Lens {
             height: settings.height_px as i32,
             focal: screen.rows[0].length().max(screen.rows[1].length()),
             reach: 0.5 * screen.width_px.max(screen.height_px) + 2.0 * f64::from(SMALL_PX),
-            code_base: super::code::base(most as f32),
+            codes,
             screen,
         }
     }

@@ -3,3 +3,6 @@
 
 mod common;
 mod kernels;
+mod oracle;
+mod pyramid;
+mod queries;
