@@ -9,7 +9,7 @@ use super::image::Image;
 use super::polygons::{Polygon, Polygons};
 use crate::culling::descent::bottom_up;
 use crate::hierarchy::{Hierarchy, LANES, NONE};
-use crate::math::{Box32, DVec3, View};
+use crate::math::{Box32, DVec3, Plane, View};
 use crate::scene::Scene;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -25,6 +25,8 @@ pub struct Choice {
     polygons: Vec<u32>,
     /// By block and lane, the largest area at or below the node.
     most_m2: Vec<[f32; LANES]>,
+    /// And the largest radius, as polygons reach out of the box that holds their centroid.
+    reach_m: Vec<[f32; LANES]>,
     heap: BinaryHeap<Waiting>,
     chosen: Vec<(f64, u32)>,
 }
@@ -78,18 +80,20 @@ impl Choice {
         order.iter().for_each(|p| start[home[*p as usize].1 as usize + 1] += 1);
         (1..start.len()).for_each(|n| start[n] += start[n - 1]);
         let mut most_m2 = vec![[0.0f32; LANES]; hierarchy.links.len()];
+        let mut reach_m = most_m2.clone();
         bottom_up(hierarchy, |block, lane| {
             let node = block * LANES + lane;
-            let own = order[start[node] as usize..start[node + 1] as usize].first().map_or(0.0, |p| area(*p) as f32);
-            let child = hierarchy.links[block].child[lane];
-            let below = if child == NONE { [0.0; LANES] } else { most_m2[child as usize] };
-            most_m2[block][lane] = below.into_iter().fold(own.next_up(), f32::max);
+            let own = order[start[node] as usize..start[node + 1] as usize].iter().map(|p| &polygons.all[*p as usize]);
+            let child = hierarchy.links[block].child[lane] as usize;
+            let below = |of: &[[f32; LANES]]| of.get(child).map_or(0.0, |b| b.iter().fold(0.0f32, |m, x| m.max(*x)));
+            most_m2[block][lane] = own.clone().fold(below(&most_m2), |m, p| m.max((p.area_m2 as f32).next_up()));
+            reach_m[block][lane] = own.fold(below(&reach_m), |m, p| m.max((p.radius_m as f32).next_up()));
         });
-        Choice { start, polygons: order, most_m2, ..Choice::default() }
+        Choice { start, polygons: order, most_m2, reach_m, ..Choice::default() }
     }
 
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.start[..]) + size_of_val(&self.polygons[..]) + size_of_val(&self.most_m2[..])
+        size_of_val(&self.start[..]) + size_of_val(&self.polygons[..]) + 2 * size_of_val(&self.most_m2[..])
     }
 
     /// The `count` best, nearest first.
@@ -105,7 +109,7 @@ impl Choice {
         self.chosen.clear();
         let eye = view.eye - hierarchy.origin;
         for block in 0..hierarchy.root_blocks {
-            self.wait(block, eye, image, hierarchy);
+            self.wait(block, eye, view, image, hierarchy);
         }
         // The least that is good enough, once there are `count`.
         let mut least = LEAST;
@@ -134,7 +138,7 @@ impl Choice {
             }
             let child = hierarchy.links[block].child[lane];
             if child != NONE {
-                self.wait(child, eye, image, hierarchy);
+                self.wait(child, eye, view, image, hierarchy);
             }
         }
         let away = |n: u32| polygons.corners(&polygons.all[n as usize]).iter();
@@ -146,12 +150,14 @@ impl Choice {
         self.chosen.iter().map(|c| c.1)
     }
 
-    fn wait(&mut self, block: u32, eye: DVec3, image: &Image, hierarchy: &Hierarchy) {
+    fn wait(&mut self, block: u32, eye: DVec3, view: &View, image: &Image, hierarchy: &Hierarchy) {
         let live = hierarchy.links[block as usize].live;
         for lane in (0..LANES).filter(|l| live >> l & 1 == 1) {
             let area = f64::from(self.most_m2[block as usize][lane]);
-            let most = area * weight(image, &hierarchy.bounds[block as usize].get(lane), eye) * (1.0 + 1e-6);
-            if most >= LEAST {
+            let bounds = hierarchy.bounds[block as usize].get(lane);
+            let most = area * weight(image, &bounds, eye) * (1.0 + 1e-6);
+            let reach_m = f64::from(self.reach_m[block as usize][lane]);
+            if most >= LEAST && in_view(view, &bounds, eye, reach_m) {
                 self.heap.push(Waiting(most, block * LANES as u32 + lane as u32));
             }
         }
@@ -180,6 +186,13 @@ fn score(view: &View, image: &Image, polygon: &Polygon) -> f64 {
 fn may_be_seen(view: &View, polygon: &Polygon) -> bool {
     let centre = polygon.centroid - view.eye;
     view.planes.iter().all(|p| p.normal.dot(centre) + p.offset_m >= -polygon.radius_m)
+}
+
+/// Something within `reach_m` of the box may be in view.
+fn in_view(view: &View, b: &Box32, eye: DVec3, reach_m: f64) -> bool {
+    let (lo, hi) = (b.lo.as_dvec3() - eye, b.hi.as_dvec3() - eye);
+    let most = |p: &Plane| (p.normal * lo).max(p.normal * hi).element_sum() + p.offset_m;
+    view.planes.iter().all(|p| most(p) >= -reach_m)
 }
 
 fn distance_squared(b: &Box32, p: DVec3) -> f64 {

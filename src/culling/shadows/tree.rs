@@ -85,14 +85,18 @@ impl Tree {
             return place;
         }
         let Node { line, at, child } = self.nodes[place as usize];
-        // A cell with too many corners stays as wide as it is, which is safe.
-        if let Some(part) = shape.below(&line, at).filter(|p| p.area() > self.speck) {
-            let cell = cell.below(&line, at + self.tau).unwrap_or(*cell);
-            self.nodes[place as usize].child[0] = self.with(child[0], &cell, &part);
-        }
-        if let Some(part) = shape.above(&line, at).filter(|p| p.area() > self.speck) {
-            let cell = cell.above(&line, at - self.tau).unwrap_or(*cell);
-            self.nodes[place as usize].child[1] = self.with(child[1], &cell, &part);
+        let (least, most) = shape.range(&line);
+        // Whether all of it lies below, and above.
+        let whole = [most <= at, least >= at];
+        for i in (0..2).filter(|i| !whole[1 - i]) {
+            let part = |o: &Outline, at: f64| if i == 0 { o.below(&line, at) } else { o.above(&line, at) };
+            let shape = if whole[i] { Some(*shape) } else { part(shape, at) };
+            if let Some(shape) = shape.filter(|s| s.area() > self.speck) {
+                // A cell with too many corners stays as wide as it is, which is safe.
+                let tau = if i == 0 { self.tau } else { -self.tau };
+                let cell = part(cell, at + tau).unwrap_or(*cell);
+                self.nodes[place as usize].child[i] = self.with(child[i], &cell, &shape);
+            }
         }
         place
     }
