@@ -148,6 +148,7 @@ fn time_per_frame(grid: &Grid) -> Figure {
             sub: "Measured; band: smallest to largest of the repeats.",
             axis: "culling time (µs)",
             working_only: true,
+            only: None,
             series: &|r| r.trial_cull_ns.iter().map(|t| t.iter().map(|ns| ns / 1e3).collect()).collect(),
         },
     );
@@ -173,6 +174,7 @@ fn triangles_per_frame(grid: &Grid) -> Figure {
             sub: "Counted; identical in every repeat, so there is no band.",
             axis: "triangles",
             working_only: false,
+            only: None,
             series: &|r| if r.triangles.is_empty() { vec![] } else { vec![r.triangles.clone()] },
         },
     );

@@ -23,6 +23,8 @@ pub struct Curves<'a> {
     pub axis: &'a str,
     /// Leave out whoever culls nothing.
     pub working_only: bool,
+    /// Only these combinations, where a chart is about some of them.
+    pub only: Option<Vec<usize>>,
     /// Per trial, frame by frame, in the unit of the axis; empty has no line.
     pub series: &'a dyn Fn(&RunResult) -> Vec<Vec<f64>>,
 }
@@ -71,7 +73,7 @@ pub fn draw(grid: &Grid, what: &Curves) -> Figure {
     let drawn = |r: &&RunResult| r.status == RunStatus::Done && !(what.working_only && r.culling == IDLE);
     let line =
         |cell: &Option<&RunResult>| cell.filter(drawn).map(what.series).map_or_else(Vec::new, |t| band(&t, every));
-    let chosen = choose(grid);
+    let chosen = choose(grid, what.only.as_deref());
     let shows = |place: usize, c: &usize| chosen.few.as_ref().is_none_or(|few| few[place].contains(c));
     let curves: Vec<Vec<Line>> = (0..grid.places.len())
         .map(|p| {
@@ -105,8 +107,11 @@ fn by_structure(grid: &Grid) -> bool {
 }
 
 /// All, or of very many those with the shortest modelled frames of each scene.
-fn choose(grid: &Grid) -> Chosen {
+fn choose(grid: &Grid, only: Option<&[usize]>) -> Chosen {
     let all = grid.legend.entries.iter().map(|e| e.look).collect();
+    if let Some(only) = only {
+        return few(grid, all, vec![only.to_vec(); grid.places.len()]);
+    }
     if by_structure(grid) || grid.combinations.len() <= MOST_LINES {
         return Chosen { legend: grid.legend.clone(), looks: all, few: None };
     }
@@ -117,7 +122,11 @@ fn choose(grid: &Grid) -> Chosen {
         timed.sort_by(|a, b| a.0.total_cmp(&b.0));
         timed.into_iter().take(FEW).map(|(_, c)| c).collect()
     };
-    let few: Vec<Vec<usize>> = (0..grid.places.len()).map(fastest).collect();
+    few(grid, all, (0..grid.places.len()).map(fastest).collect())
+}
+
+/// Of each place these alone.
+fn few(grid: &Grid, all: Vec<Look>, few: Vec<Vec<usize>>) -> Chosen {
     let union: Vec<usize> = few.iter().flatten().copied().collect::<BTreeSet<_>>().into_iter().collect();
     let legend = grid.legend.few(&union);
     let mut looks: Vec<Look> = all;
@@ -127,7 +136,7 @@ fn choose(grid: &Grid) -> Chosen {
 
 /// For the caption: who is drawn, where it is not everybody.
 pub fn words(grid: &Grid) -> String {
-    match choose(grid).few {
+    match choose(grid, None).few {
         None => String::new(),
         Some(_) => format!(
             " Of {} combinations the {FEW} with the shortest modelled frame of each scene are drawn, in looks of this \
@@ -139,7 +148,7 @@ pub fn words(grid: &Grid) -> String {
 
 fn layout(grid: &Grid, chosen: &Chosen) -> Layout {
     let legend = &chosen.legend;
-    let by_structure = by_structure(grid);
+    let by_structure = by_structure(grid) && chosen.few.is_none();
     let sample = if by_structure { Sample::CullingLine } else { Sample::Line };
     let top = 58.0 + facets::legend_height(legend, WIDTH - 32.0, sample);
     let of_variant = |v: usize| (0..grid.combinations.len()).filter(move |c| grid.variant_of[*c] == v).collect();

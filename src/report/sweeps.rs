@@ -90,6 +90,12 @@ pub fn chart<'a>(results: &'a StudyResults, sweep: &'a Sweep) -> Result<Chart<'a
     if panels.is_empty() {
         return Err(format!("no run has the number `{}` that the chart `{}` is to be drawn over", sweep.x, sweep.id));
     }
+    // What stands at one place alone says nothing of the stressor, beside what moves along it.
+    let moves = |l: &Line| l.points.len() > 1;
+    if panels.iter().any(|(_, p)| p.lines.iter().any(moves)) {
+        panels.iter_mut().for_each(|(_, p)| p.lines.retain(moves));
+        panels.retain(|(_, p)| !p.lines.is_empty());
+    }
     let titles = titles(&panels.iter().map(|(f, _)| f).collect::<Vec<_>>());
     let mut panels: Vec<Panel> = panels.into_iter().map(|(_, p)| p).collect();
     for (panel, title) in panels.iter_mut().zip(titles) {
