@@ -12,8 +12,9 @@
 //! first frame has nothing to start with and draws all that is in view.
 //!
 //! What we changed: the answers of the last frame are bits of nodes, not of objects; the
-//! second pass asks about inner nodes, too; what it draws does not go to the depth buffer,
-//! as nothing is asked after it.
+//! second pass asks about inner nodes, too, of a pyramid of farthest depth or of all
+//! pixels (`pyramid`); what it draws does not go to the depth buffer, as nothing is asked
+//! after it.
 //!
 //! Sample-conservative: a node is left out only if the triangles of the first pass, all of
 //! them submitted, cover its box at every sample of the buffer. Conservative with inner
@@ -23,18 +24,29 @@ use super::descent::Descent;
 use super::occluders::{COVERAGE, HEIGHT_PX, WIDTH_PX, class_of, occluders_of, settings_of};
 use super::*;
 use crate::hierarchy::NONE;
+use crate::raster::pyramid::Pyramid;
 use crate::raster::{DepthBuffer, Occluders, Settings};
 
 pub const ENTRY: Entry<dyn Walk> = Entry {
     name: "hiz_two_pass",
     about: "draws what the last frame saw, then what shows behind its depth (Haar & Aaltonen 2015)",
     revision: 1,
-    params: &[COVERAGE, HEIGHT_PX, WIDTH_PX],
-    make: |spec| Box::new(HizTwoPass::new(settings_of(spec))),
+    params: &[
+        COVERAGE,
+        HEIGHT_PX,
+        Param {
+            name: "pyramid",
+            default: Allowed::Bool(true),
+            about: "boxes are looked up in a pyramid of farthest depth, four texels each; false: in all pixels that they cover",
+        },
+        WIDTH_PX,
+    ],
+    make: |spec| Box::new(HizTwoPass::new(settings_of(spec), spec.bool("pyramid"))),
 };
 
 pub struct HizTwoPass {
     buffer: DepthBuffer,
+    pyramid: bool,
     occluders: Occluders,
     descent: Descent,
     /// By block, the lanes that showed at the end of the last frame, and of this one. Those
@@ -44,9 +56,10 @@ pub struct HizTwoPass {
 }
 
 impl HizTwoPass {
-    pub fn new(settings: Settings) -> HizTwoPass {
+    pub fn new(settings: Settings, pyramid: bool) -> HizTwoPass {
         HizTwoPass {
             buffer: DepthBuffer::new(settings),
+            pyramid,
             occluders: Occluders::default(),
             descent: Descent::default(),
             seen: Vec::new(),
@@ -95,6 +108,8 @@ impl HizTwoPass {
         out: &mut DrawList,
         tally: &mut Tally,
     ) {
+        // Nothing hides anything in a frame that drew nothing: no need to look at all pixels.
+        let pyramid: Option<Pyramid> = (self.pyramid && !out.ranges.is_empty()).then(|| self.buffer.pyramid());
         let count = tests.len();
         for root in 0..hierarchy.root_blocks {
             self.descent.clear();
@@ -104,7 +119,12 @@ impl HizTwoPass {
                 let links = &hierarchy.links[block];
                 let drawn = self.seen[block] & bit != 0;
                 tally.boxes_queried += 1;
-                if !self.buffer.shows(&hierarchy.bounds[block].get(at.lane)) {
+                let bounds = hierarchy.bounds[block].get(at.lane);
+                let shown = match &pyramid {
+                    Some(pyramid) => pyramid.shows(&bounds),
+                    None => self.buffer.shows(&bounds),
+                };
+                if !shown {
                     if !drawn {
                         tally.nodes_occluded += 1;
                         tally.entries_occluded += u64::from(links.end[at.lane] - links.first[at.lane]);

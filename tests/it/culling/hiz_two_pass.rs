@@ -11,7 +11,7 @@ use cullmark::record::Accuracy;
 use cullmark::registry::Spec;
 
 const SAMPLES: &str = "hiz_two_pass:width_px=96,height_px=54";
-const INNER: &str = "hiz_two_pass:width_px=160,height_px=90,coverage=inner";
+const INNER: &str = "hiz_two_pass:width_px=161,height_px=90,coverage=inner,pyramid=false";
 
 #[test]
 fn nothing_that_its_class_owes_is_lost() {
@@ -62,7 +62,7 @@ fn class_and_samples_are_those_of_the_buffer() {
     let made = |text: &str| make_walk(&Spec::parse(text).unwrap()).unwrap().0;
     let (samples, inner) = (made(SAMPLES), made(INNER));
     assert_eq!((samples.class(), samples.samples()), (Class::SampleConservative, Some((96, 54))));
-    assert_eq!((inner.class(), inner.samples()), (Class::Conservative, Some((160, 90))));
+    assert_eq!((inner.class(), inner.samples()), (Class::Conservative, Some((161, 90))));
     assert!(samples.remembers() && samples.removes().occluded);
 }
 
@@ -77,7 +77,7 @@ fn what_was_seen_hides_and_what_appears_is_drawn_at_once() {
     let (before, aside) = (at(0.0, DVec3::X), at(-20.0, DVec3::new(12.0, 20.0, 0.0)));
     for structure in ["list:leaf_size=1", "bvh:leaf_size=1", "octree:depth=6,leaf_limit=1"] {
         let h = built(structure, &scene).unwrap();
-        let mut method = Method::new(&scene, &h, "frustum", "hiz_two_pass");
+        let mut method = Method::new(&scene, &h, "frustum", "hiz_two_pass:pyramid=false");
         let mut frame = |view: &View| {
             let (out, tally) = method.frame(view);
             let set = triangles(&h, &out);
