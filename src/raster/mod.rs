@@ -25,6 +25,7 @@ mod lanes_avx512;
 mod lanes_scalar;
 mod large;
 pub mod occluders;
+mod pairs;
 pub mod plain;
 pub mod project;
 pub mod pyramid;
