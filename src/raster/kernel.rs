@@ -61,6 +61,22 @@ impl Chunk {
         self.bins.iter_mut().for_each(Vec::clear);
     }
 
+    /// The small triangles of a block; returns the place of the first.
+    ///
+    /// # Safety
+    /// The kernel's features are there.
+    #[inline(always)]
+    unsafe fn add<L: Lanes>(&mut self, block: &Block, small: u32) -> u32 {
+        let first = self.smalls.len();
+        self.smalls.reserve(LANES);
+        // SAFETY: there is room for all lanes, and those that are kept were written.
+        unsafe {
+            L::records(block, small, self.smalls.as_mut_ptr().add(first));
+            self.smalls.set_len(first + small.count_ones() as usize);
+        }
+        first as u32
+    }
+
     fn push(&mut self, item: u32, x0: i32, x1: i32, group_px: i32) {
         for g in x0 / group_px..=(x1 - 1) / group_px {
             self.bins[g as usize].push(item);
@@ -175,6 +191,8 @@ unsafe fn emit<L: Lanes>(
     pairs: u32,
     sink: &mut Sink,
 ) {
+    // SAFETY: the caller has the features.
+    let first = if let Sink::Chunk(chunk, _) = sink { unsafe { chunk.add::<L>(block, small) } } else { 0 };
     let mut rest = small | other;
     while rest != 0 {
         let lane = rest.trailing_zeros() as usize & (LANES - 1);
@@ -184,8 +202,8 @@ unsafe fn emit<L: Lanes>(
                 // SAFETY: the lane was just set up.
                 Sink::Tiles(t) => unsafe { fill::small::<L>(t, &Lane(block, lane)) },
                 Sink::Chunk(chunk, group_px) => {
-                    chunk.smalls.push(Alone::new(block, lane));
-                    chunk.push(chunk.smalls.len() as u32 - 1, block.x0[lane], block.x1[lane], *group_px);
+                    let before = (small & between(0, lane as u32)).count_ones();
+                    chunk.push(first + before, block.x0[lane], block.x1[lane], *group_px);
                 }
             }
             continue;

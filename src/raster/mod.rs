@@ -13,6 +13,9 @@
 //! subtiles), `tiles` (the buffer). `lanes` is what these are written in, `kernel`
 //! what they are compiled for, `queue` who draws when.
 
+// "Not above" is said so that what is no number is not above either.
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
+
 mod block;
 mod code;
 mod fill;
