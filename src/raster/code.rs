@@ -14,13 +14,13 @@ pub struct Codes {
 impl Codes {
     /// For perspective: no nearness is above `most`.
     pub fn logarithmic(most: f32) -> Codes {
-        let top = (most.max(0.0).min(f32::MAX).to_bits() >> 12) as i32;
+        let top = (most.clamp(0.0, f32::MAX).to_bits() >> 12) as i32;
         Codes { shift: 12, base: (top - 65535).max(0) }
     }
 
     /// For parallel rays: all values are above `least`, up to twice that.
     pub fn even(least: f32) -> Codes {
-        let low = (least.max(0.0).min(f32::MAX).to_bits() >> 7) as i32;
+        let low = (least.clamp(0.0, f32::MAX).to_bits() >> 7) as i32;
         Codes { shift: 7, base: (low - 1).max(0) }
     }
 

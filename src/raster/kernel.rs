@@ -61,6 +61,22 @@ impl Chunk {
         self.bins.iter_mut().for_each(Vec::clear);
     }
 
+    /// The small triangles of a block; returns the place of the first.
+    ///
+    /// # Safety
+    /// The kernel's features are there.
+    #[inline(always)]
+    unsafe fn add<L: Lanes>(&mut self, block: &Block, small: u32) -> u32 {
+        let first = self.smalls.len();
+        self.smalls.reserve(LANES);
+        // SAFETY: there is room for all lanes, and those that are kept were written.
+        unsafe {
+            L::records(block, small, self.smalls.as_mut_ptr().add(first));
+            self.smalls.set_len(first + small.count_ones() as usize);
+        }
+        first as u32
+    }
+
     fn push(&mut self, item: u32, x0: i32, x1: i32, group_px: i32) {
         for g in x0 / group_px..=(x1 - 1) / group_px {
             self.bins[g as usize].push(item);
@@ -105,16 +121,19 @@ unsafe fn draw_in<L: Lanes>(lens: &Lens, store: &Store, first: u32, end: u32, sc
             L::project(&view, &batch, &mut corners[..batch.x.len()]);
             while p < stop {
                 let (mut small, mut other) = (0, 0);
+                let (firsts, paired) =
+                    if view.inner { store.pairs(p, (stop - p).min(LANES as u32), first..end) } else { (0, 0) };
                 let block = &mut blocks[current];
                 let mut lane = 0;
                 while lane < LANES && p + (lane as u32) < stop {
-                    let live = between(0, (stop - p - lane as u32).min(L::N as u32));
+                    let live = between(0, (stop - p - lane as u32).min(L::N as u32)) & !(paired >> lane);
                     let words = store.words().as_ptr().add(p as usize + lane);
                     let made = set_up::<L>(&view, corners.as_ptr(), words, live, block, lane);
                     small |= made.small << lane;
                     other |= made.other << lane;
                     lane += L::N;
                 }
+                other |= firsts;
                 if small | other != 0 {
                     if let Sink::Tiles(t) = sink {
                         prefetch::<L>(t, block, small);
@@ -123,7 +142,7 @@ unsafe fn draw_in<L: Lanes>(lens: &Lens, store: &Store, first: u32, end: u32, sc
                     }
                     if other != 0 || matches!(sink, Sink::Chunk(..)) {
                         let block = if let Sink::Tiles(_) = sink { 1 - current } else { current };
-                        emit::<L>(lens, store, &view, b, p, &blocks[block], small, other, sink);
+                        emit::<L>(lens, store, &view, b, p, &blocks[block], small, other, firsts, sink);
                         waiting = 0;
                     }
                 }
@@ -158,7 +177,7 @@ unsafe fn draw_block<L: Lanes>(t: &TilesView, block: &Block, mut lanes: u32) {
     }
 }
 
-/// The triangles of a block in order, small ones and others.
+/// The triangles of a block in order, small ones and others; those of `pairs` with their partners.
 #[inline(always)]
 unsafe fn emit<L: Lanes>(
     lens: &Lens,
@@ -169,8 +188,11 @@ unsafe fn emit<L: Lanes>(
     block: &Block,
     small: u32,
     other: u32,
+    pairs: u32,
     sink: &mut Sink,
 ) {
+    // SAFETY: the caller has the features.
+    let first = if let Sink::Chunk(chunk, _) = sink { unsafe { chunk.add::<L>(block, small) } } else { 0 };
     let mut rest = small | other;
     while rest != 0 {
         let lane = rest.trailing_zeros() as usize & (LANES - 1);
@@ -180,15 +202,20 @@ unsafe fn emit<L: Lanes>(
                 // SAFETY: the lane was just set up.
                 Sink::Tiles(t) => unsafe { fill::small::<L>(t, &Lane(block, lane)) },
                 Sink::Chunk(chunk, group_px) => {
-                    chunk.smalls.push(Alone::new(block, lane));
-                    chunk.push(chunk.smalls.len() as u32 - 1, block.x0[lane], block.x1[lane], *group_px);
+                    let before = (small & between(0, lane as u32)).count_ones();
+                    chunk.push(first + before, block.x0[lane], block.x1[lane], *group_px);
                 }
             }
             continue;
         }
         let position = p + lane as u32;
         let two_sided = store.words()[position as usize] >> 24 > 1;
-        let Some(large) = large::make(lens, view, &store.fixed(batch, position), two_sided) else { continue };
+        let pair = if pairs >> lane & 1 != 0 { store.fixed_pair(batch, position) } else { None };
+        let large = match pair {
+            Some(quad) => large::make(lens, view, &quad, two_sided),
+            None => large::make(lens, view, &store.fixed(batch, position), two_sided),
+        };
+        let Some(large) = large else { continue };
         match sink {
             // SAFETY: it was just made.
             Sink::Tiles(t) => unsafe { fill::large::<L>(t, &large) },

@@ -1,6 +1,6 @@
 //! Sixteen lanes by AVX-512, explicit intrinsics only. A line of 32 pixels is one register.
 
-use super::block::{Corner, OFF};
+use super::block::{Alone, Block, Corner, OFF};
 use super::code::Codes;
 use super::lanes::{Fetched, Lanes};
 use super::vertices::{Batch, BatchView, FAR, SUBPIXELS};
@@ -202,6 +202,40 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
+    unsafe fn records(block: &Block, mut live: u32, mut to: *mut Alone) {
+        // SAFETY: callers have the features and room for sixteen records of 64 bytes.
+        unsafe {
+            let f = |c: usize| _mm512_castps_si512(_mm512_load_ps(block.f[c].as_ptr()));
+            let pair = |a: &[i32; 16], b: &[i32; 16]| {
+                let b = _mm512_slli_epi32::<16>(_mm512_load_si512(b.as_ptr().cast()));
+                _mm512_or_si512(_mm512_load_si512(a.as_ptr().cast()), b)
+            };
+            let rect = [pair(&block.x0, &block.x1), pair(&block.y0, &block.y1), _mm512_setzero_si512()];
+            let quarters = [
+                four_by_four(f(0), f(1), f(2), f(3)),
+                four_by_four(f(4), f(5), f(6), f(7)),
+                four_by_four(f(8), f(9), f(10), f(11)),
+                four_by_four(f(12), rect[0], rect[1], rect[2]),
+            ];
+            let mut records = [Block::EMPTY.x0; 16];
+            for j in 0..4 {
+                // Lane group g of q[k] holds columns 4 k .. 4 k + 4 of triangle 4 g + j.
+                let q = [quarters[0][j], quarters[1][j], quarters[2][j], quarters[3][j]];
+                let t = four_groups(q);
+                for (g, t) in t.into_iter().enumerate() {
+                    _mm512_storeu_si512(records[4 * g + j].as_mut_ptr().cast(), t);
+                }
+            }
+            while live != 0 {
+                let record = _mm512_loadu_si512(records[live.trailing_zeros() as usize & 15].as_ptr().cast());
+                _mm512_storeu_si512(to.cast(), record);
+                to = to.add(1);
+                live &= live - 1;
+            }
+        }
+    }
+
+    #[inline(always)]
     unsafe fn bound(at: f64, step: f64, first: f64, limit: f64) -> __m512i {
         // SAFETY: callers have the features.
         unsafe {
@@ -234,14 +268,40 @@ unsafe fn corner<const K: usize>(at: *const Corner, bytes: *const u8) -> Fetched
     unsafe {
         let (r0, r1) = (four::<K, 0>(at, bytes), four::<K, 1>(at, bytes));
         let (r2, r3) = (four::<K, 2>(at, bytes), four::<K, 3>(at, bytes));
+        let [x, y, n, code] = four_by_four(r0, r1, r2, r3);
+        Fetched { x, y, n: _mm512_castsi512_ps(n), code }
+    }
+}
+
+/// In each group of four lanes the j-th of the result holds the j-th lanes of the four.
+#[inline(always)]
+unsafe fn four_by_four(r0: __m512i, r1: __m512i, r2: __m512i, r3: __m512i) -> [__m512i; 4] {
+    // SAFETY: callers have the features.
+    unsafe {
         let (a, b) = (_mm512_unpacklo_epi32(r0, r1), _mm512_unpackhi_epi32(r0, r1));
         let (c, d) = (_mm512_unpacklo_epi32(r2, r3), _mm512_unpackhi_epi32(r2, r3));
-        Fetched {
-            x: _mm512_unpacklo_epi64(a, c),
-            y: _mm512_unpackhi_epi64(a, c),
-            n: _mm512_castsi512_ps(_mm512_unpacklo_epi64(b, d)),
-            code: _mm512_unpackhi_epi64(b, d),
-        }
+        [
+            _mm512_unpacklo_epi64(a, c),
+            _mm512_unpackhi_epi64(a, c),
+            _mm512_unpacklo_epi64(b, d),
+            _mm512_unpackhi_epi64(b, d),
+        ]
+    }
+}
+
+/// The g-th of the result holds the g-th groups of four lanes of the four.
+#[inline(always)]
+unsafe fn four_groups(q: [__m512i; 4]) -> [__m512i; 4] {
+    // SAFETY: callers have the features.
+    unsafe {
+        let (a, b) = (_mm512_shuffle_i32x4::<0x44>(q[0], q[1]), _mm512_shuffle_i32x4::<0xee>(q[0], q[1]));
+        let (c, d) = (_mm512_shuffle_i32x4::<0x44>(q[2], q[3]), _mm512_shuffle_i32x4::<0xee>(q[2], q[3]));
+        [
+            _mm512_shuffle_i32x4::<0x88>(a, c),
+            _mm512_shuffle_i32x4::<0xdd>(a, c),
+            _mm512_shuffle_i32x4::<0x88>(b, d),
+            _mm512_shuffle_i32x4::<0xdd>(b, d),
+        ]
     }
 }
 

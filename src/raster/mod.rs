@@ -13,6 +13,9 @@
 //! subtiles), `tiles` (the buffer). `lanes` is what these are written in, `kernel`
 //! what they are compiled for, `queue` who draws when.
 
+// "Not above" is said so that what is no number is not above either.
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
+
 mod block;
 mod code;
 mod fill;
@@ -26,6 +29,7 @@ mod lanes_avx512;
 mod lanes_scalar;
 mod large;
 pub mod occluders;
+mod pairs;
 pub mod plain;
 pub mod project;
 pub mod pyramid;

@@ -4,6 +4,7 @@
 //! the batch's own origin, and four bytes a triangle. A step of the fixed point is
 //! a power of two, so vertices on a grid are kept as they are; how far the others move is measured.
 
+use super::pairs;
 use super::vertices::Batch;
 use crate::math::DVec3;
 use rayon::prelude::*;
@@ -40,6 +41,8 @@ pub(super) struct Store {
     z: Vec<i32>,
     /// Corners in the batch and kind of a position; 16 spare ones, so that wide loads may start at the last.
     words: Vec<u32>,
+    /// See `pairs`.
+    partners: Vec<i8>,
     /// Of positions before this one, how many hide.
     hiding: Vec<u32>,
     /// Bounds of all that hides.
@@ -85,6 +88,7 @@ impl Occluders {
                 s.hiding.push(s.hiding.last().unwrap_or(&0) + u32::from(word >> 24 != 0));
                 s.words.push(word);
             }
+            s.partners.extend(m.partners);
             (s.lo, s.hi) = (s.lo.min(m.lo), s.hi.max(m.hi));
         }
         s.near_batch.resize((count as usize).div_ceil(64) + 1, s.batches.len().saturating_sub(1) as u32);
@@ -103,6 +107,7 @@ impl Occluders {
     pub fn bytes(&self) -> usize {
         let s = &self.store;
         12 * s.x.len()
+            + s.partners.len()
             + 4 * (s.words.len() + s.hiding.len() + s.near_batch.len())
             + s.batches.len() * size_of::<Place>()
     }
@@ -164,6 +169,30 @@ impl Store {
         })
     }
 
+    /// Of those of `count` positions from `first` on whose partners are in `range`: lanes
+    /// of the first of two, and of both.
+    pub fn pairs(&self, first: u32, count: u32, range: std::ops::Range<u32>) -> (u32, u32) {
+        let (mut firsts, mut both) = (0, 0);
+        for (i, p) in (first..first + count).enumerate() {
+            let step = i64::from(self.partners[p as usize]);
+            let partner = i64::from(p) + step;
+            if step != 0 && i64::from(range.start) <= partner && partner < i64::from(range.end) {
+                both |= 1 << i;
+                firsts |= u32::from(step > 0) << i;
+            }
+        }
+        (firsts, both)
+    }
+
+    /// Corners of a position and its partner, of the two together.
+    pub fn fixed_pair(&self, b: usize, position: u32) -> Option<[[i32; 3]; 4]> {
+        let first = self.batches[b].vertices as usize;
+        let corners = |p: u32| std::array::from_fn(|k| (self.words[p as usize] >> (8 * k) & 0xff) as usize);
+        let partner = position.checked_add_signed(i32::from(self.partners[position as usize]))?;
+        let quad = pairs::joined(corners(position), corners(partner))?;
+        Some(quad.map(|i| [self.x[first + i], self.y[first + i], self.z[first + i]]))
+    }
+
     pub fn words(&self) -> &[u32] {
         &self.words
     }
@@ -193,6 +222,7 @@ struct Made {
     place: Place,
     vertices: Vec<[i32; 3]>,
     words: Vec<u32>,
+    partners: Vec<i8>,
     lo: DVec3,
     hi: DVec3,
 }
@@ -246,7 +276,8 @@ impl Made {
         let size = if empty { 0.0 } else { lo.abs().max(hi.abs()).max_element() };
         let off_m = off_m + size * f64::EPSILON;
         let place = Place { first, vertices: 0, count: vertices.len() as u32, origin, step_m, off_m };
-        Made { place, vertices, words, lo, hi }
+        let partners = if vertices.len() <= MOST_VERTICES { pairs::of(&words, &corners) } else { Vec::new() };
+        Made { place, vertices, words, partners, lo, hi }
     }
 }
 

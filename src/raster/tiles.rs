@@ -204,6 +204,19 @@ impl TilesView {
             let mut y = r.y0 & !3;
             while y < r.y1 {
                 let at = strip as usize * self.per_strip + y as usize;
+                // Four at once, as long as nothing is open.
+                if y + 4 * L::N as u32 <= r.y1 {
+                    // SAFETY: as the caller promises.
+                    let open = unsafe {
+                        let floor = |i: usize| L::load_f(self.floors.add(at + i * L::N));
+                        let least = L::min(L::min(floor(0), floor(1)), L::min(floor(2), floor(3)));
+                        L::bits(L::ge(L::f(nearness), least))
+                    };
+                    if open & touched == 0 {
+                        y += 4 * L::N as u32;
+                        continue;
+                    }
+                }
                 let rows = (r.y1 - y).div_ceil(4).min(L::N as u32 / 4);
                 // SAFETY: as the caller promises; rows past the image are spare.
                 let open = unsafe { L::bits(L::ge(L::f(nearness), L::load_f(self.floors.add(at)))) };
@@ -213,7 +226,7 @@ impl TilesView {
                     open &= open - 1;
                     let top = y + i / 4 * 4;
                     let rows = between((r.y0.max(top) - top) * 8, (r.y1.min(top + 4) - top) * 8);
-                    let wanted = (columns >> (8 * (i % 4)) & 0xff) * 0x0101_0101 & rows;
+                    let wanted = ((columns >> (8 * (i % 4)) & 0xff) * 0x0101_0101) & rows;
                     // SAFETY: as above; a line is read under its mask only.
                     let hidden = unsafe {
                         let known = *self.known.add(at + i as usize);

@@ -23,7 +23,9 @@ fn check(scene: &Scene, view: &View, coverage: Coverage, what: &str) -> usize {
     buffer.begin(view, scene.origin);
     buffer.draw(&occluders, 0, scene.len() as u32);
     let image = buffer.image();
-    let grid = Grid { width_px, height_px, samples: 1 };
+    // Inner coverage holds over the whole pixel.
+    let samples = if coverage == Coverage::Inner { 4 } else { 1 };
+    let grid = Grid { width_px, height_px, samples };
     let standings = sets::standings(scene, view).0;
     let screen = Screen::new(view, scene.origin, s);
     let mut covered = 0;
@@ -32,8 +34,10 @@ fn check(scene: &Scene, view: &View, coverage: Coverage, what: &str) -> usize {
             let corners =
                 (run.winner != 0).then(|| scene.corners(run.winner - 1).map(|c| screen.camera(c - scene.origin)));
             for x in run.x..run.x + run.len {
-                let hides = image[(run.y * width_px + x) as usize];
-                let seen = corners.map_or(f64::NEG_INFINITY, |c| nearness(&screen, &c, x, run.y));
+                let hides = image[(run.y / samples * width_px + x / samples) as usize];
+                let seen = corners.map_or(f64::NEG_INFINITY, |c| {
+                    nearness(&screen, &c, [x, run.y].map(|v| (f64::from(v) + 0.5) / f64::from(samples)))
+                });
                 assert!(
                     f64::from(hides) <= seen + 1e-9 * seen.abs().min(1e300),
                     "{what}: at ({x}, {}) {hides} hides triangle {} at {seen}",
@@ -47,9 +51,9 @@ fn check(scene: &Scene, view: &View, coverage: Coverage, what: &str) -> usize {
     covered
 }
 
-/// Of the triangle's plane at a sample, from corners in camera coordinates.
-fn nearness(screen: &Screen, c: &[DVec3; 3], x: u32, y: u32) -> f64 {
-    let (x, y) = (f64::from(x) + 0.5 - screen.width_px * 0.5, f64::from(y) + 0.5 - screen.height_px * 0.5);
+/// Of the triangle's plane at a place on the image, from corners in camera coordinates.
+fn nearness(screen: &Screen, c: &[DVec3; 3], [x, y]: [f64; 2]) -> f64 {
+    let (x, y) = (x - screen.width_px * 0.5, y - screen.height_px * 0.5);
     let normal = (c[1] - c[0]).cross(c[2] - c[0]);
     if screen.perspective {
         normal.dot(DVec3::new(x, y, 1.0)) / normal.dot(c[0])
@@ -86,7 +90,9 @@ fn nothing_that_a_sample_sees_is_hidden_in_soups() {
         let mut r = Random::new(seed);
         let pose = Pose { eye: scene.origin + r.vector() * 15.0, forward: r.vector().normalize(), up: DVec3::Z };
         let view = View::new(&Camera::default(), &pose);
-        covered += check(&scene, &view, Coverage::Samples, &format!("soup {seed}"));
+        for coverage in [Coverage::Samples, Coverage::Inner] {
+            covered += check(&scene, &view, coverage, &format!("soup {seed} {coverage:?}"));
+        }
     }
     assert!(covered > 200_000, "{covered} pixels hide");
 }
