@@ -37,7 +37,7 @@ pub const ENTRY: Entry<dyn Walk> = Entry {
         Param {
             name: "pyramid",
             default: Allowed::Bool(true),
-            about: "boxes are looked up in a pyramid of farthest depth, four texels each; false: in all pixels that they cover",
+            about: "boxes are looked up in a pyramid of farthest depth over 8 x 4 pixels, four texels each; false: in all pixels that they cover",
         },
         WIDTH_PX,
     ],

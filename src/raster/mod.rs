@@ -186,19 +186,28 @@ impl DepthBuffer {
     /// infinity where nothing was drawn.
     pub fn image(&mut self) -> Vec<f32> {
         self.flush();
-        let (codes, ahead) = self.lens.as_ref().map_or_else(Default::default, |l| (l.codes, l.ahead));
-        let nearness = |key: f32| match key {
+        let codes = self.lens.as_ref().map_or_else(Default::default, |l| l.codes);
+        self.tiles.image(codes).into_iter().map(|key| self.nearness(key)).collect()
+    }
+
+    /// A pyramid over all that was drawn; its finest texels are subtiles of 8 x 4 pixels.
+    pub fn pyramid(&mut self) -> Pyramid {
+        self.flush();
+        let (across, down) = (self.settings.width_px.div_ceil(8), self.settings.height_px.div_ceil(4));
+        let cell = |row, column| self.nearness(self.tiles.floors[self.tiles.index(column, row)]);
+        let cells: Vec<f32> =
+            (0..down).flat_map(|row| (0..across).map(move |column| (row, column))).map(|(r, c)| cell(r, c)).collect();
+        Pyramid::over(&self.screen, [3, 2], &cells)
+    }
+
+    /// What a key of the tiles stands for; 0 is nothing.
+    fn nearness(&self, key: f32) -> f32 {
+        let ahead = self.lens.as_ref().map_or(0.0, |l| l.ahead);
+        match key {
             0.0 => f32::NEG_INFINITY,
             _ if self.screen.perspective => key,
             _ => f32_below(f64::from(key) - ahead),
-        };
-        self.tiles.image(codes).into_iter().map(nearness).collect()
-    }
-
-    /// A pyramid over all that was drawn.
-    pub fn pyramid(&mut self) -> Pyramid {
-        let image = self.image();
-        Pyramid::new(&self.screen, &image)
+        }
     }
 
     pub fn bytes(&self) -> usize {

@@ -12,6 +12,8 @@ use crate::math::Box32;
 #[derive(Debug, Clone, Default)]
 pub struct Pyramid {
     screen: Screen,
+    /// A texel of level 0 is 2^k pixels wide and high.
+    shift: [u32; 2],
     /// Size, and nearness of each texel, row-major, of level 0 and on.
     levels: Vec<Level>,
 }
@@ -25,8 +27,15 @@ struct Level {
 impl Pyramid {
     /// Of an image of nearness, row-major, as large as the screen.
     pub fn new(screen: &Screen, nearness: &[f32]) -> Pyramid {
-        let (width, height) = (screen.width_px as usize, screen.height_px as usize);
-        assert_eq!(nearness.len(), width * height, "an image as large as the screen");
+        Pyramid::over(screen, [0, 0], nearness)
+    }
+
+    /// Of the farthest nearness in each cell of 2^k pixels width and height, row-major; those
+    /// at the right and bottom may reach beyond the image.
+    pub fn over(screen: &Screen, shift: [u32; 2], nearness: &[f32]) -> Pyramid {
+        let cells = |pixels: f64, shift: u32| (pixels as usize).div_ceil(1 << shift);
+        let (width, height) = (cells(screen.width_px, shift[0]), cells(screen.height_px, shift[1]));
+        assert_eq!(nearness.len(), width * height, "as many cells as cover the screen");
         let (w, h) = (width.next_power_of_two(), height.next_power_of_two());
         let mut first = vec![f32::INFINITY; w * h];
         for y in 0..height {
@@ -46,7 +55,7 @@ impl Pyramid {
             let nearness = (0..w * h).map(farthest).collect();
             levels.push(Level { width: w, nearness });
         }
-        Pyramid { screen: screen.clone(), levels }
+        Pyramid { screen: screen.clone(), shift, levels }
     }
 
     pub fn bytes(&self) -> usize {
@@ -64,6 +73,9 @@ impl Pyramid {
 
     /// Whether something of this nearness may show in a rectangle of the image.
     pub fn shows_rect(&self, r: Rect, nearness: f32) -> bool {
+        let [across, down] = self.shift;
+        let r =
+            Rect { x0: r.x0 >> across, x1: ((r.x1 - 1) >> across) + 1, y0: r.y0 >> down, y1: ((r.y1 - 1) >> down) + 1 };
         let level = self.level(r);
         let l = &self.levels[level];
         let (x0, x1) = (r.x0 as usize >> level, (r.x1 as usize - 1) >> level);
@@ -74,7 +86,7 @@ impl Pyramid {
         !([at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1)].into_iter().all(|n| nearness < n))
     }
 
-    /// The finest level of which at most two by two texels hold the rectangle.
+    /// Of a rectangle in texels of level 0, the finest level of which at most two by two texels hold the rectangle.
     fn level(&self, r: Rect) -> usize {
         let across = |a: u32, b: u32, level: u32| ((b - 1) >> level) - (a >> level);
         let fits = |level: u32| across(r.x0, r.x1, level) <= 1 && across(r.y0, r.y1, level) <= 1;

@@ -110,7 +110,10 @@ fn by_structure(grid: &Grid) -> bool {
 fn choose(grid: &Grid, only: Option<&[usize]>) -> Chosen {
     let all = grid.legend.entries.iter().map(|e| e.look).collect();
     if let Some(only) = only {
-        return few(grid, all, vec![only.to_vec(); grid.places.len()]);
+        let mut chosen = few(grid, all, vec![only.to_vec(); grid.places.len()]);
+        let shared = shared(chosen.legend.entries.iter().map(|e| e.label.as_str()));
+        chosen.legend.entries.iter_mut().for_each(|e| _ = e.label.drain(..shared));
+        return chosen;
     }
     if by_structure(grid) || grid.combinations.len() <= MOST_LINES {
         return Chosen { legend: grid.legend.clone(), looks: all, few: None };
@@ -123,6 +126,14 @@ fn choose(grid: &Grid, only: Option<&[usize]>) -> Chosen {
         timed.into_iter().take(FEW).map(|(_, c)| c).collect()
     };
     few(grid, all, (0..grid.places.len()).map(fastest).collect())
+}
+
+/// Bytes of what all labels begin with, up to the end of a part: it need not be said again and again.
+fn shared<'a>(mut labels: impl Iterator<Item = &'a str>) -> usize {
+    let Some(first) = labels.next() else { return 0 };
+    let ends = |l: &str| first.bytes().zip(l.bytes()).take_while(|(a, b)| a == b).count();
+    let common = labels.map(ends).min().unwrap_or(0);
+    first.match_indices(" × ").map(|(at, part)| at + part.len()).filter(|end| *end <= common).max().unwrap_or(0)
 }
 
 /// Of each place these alone.

@@ -38,10 +38,14 @@ fn waiting(grid: &Grid) -> Vec<usize> {
     of_first_structure(grid).filter(|(_, r)| shown(r)).map(|(c, _)| c).collect()
 }
 
+fn first_structure<'a>(grid: &'a Grid) -> &'a str {
+    grid.cells.iter().flatten().flatten().next().map_or("", |r| &r.structure)
+}
+
 fn of_first_structure<'a>(grid: &'a Grid) -> impl Iterator<Item = (usize, &'a RunResult)> {
     let run = |c: usize| grid.cells.iter().find_map(|place| place[c]);
-    let first = (0..grid.combinations.len()).find_map(run).map(|r| &r.structure);
-    (0..grid.combinations.len()).filter_map(move |c| run(c).filter(|r| Some(&r.structure) == first).map(|r| (c, r)))
+    let first = first_structure(grid);
+    (0..grid.combinations.len()).filter_map(move |c| run(c).filter(|r| r.structure == first).map(|r| (c, r)))
 }
 
 /// One counted series: identical in every trial, so one line.
@@ -52,10 +56,10 @@ fn counted(values: &[f64]) -> Vec<Vec<f64>> {
 fn chart(grid: &Grid, what: Curves, about: &str, which: &str) -> Figure {
     let every = grid.results.consolidate_frames.max(1);
     let caption = format!(
-        "{about}; {}. Each point is the mean of {}. Identical in every repeat, so there is no band. {} The tables hold all.",
+        "{about}; {}. Each point is the mean of {}. Identical in every repeat, so there is no band. Drawn is, on {}, {which}; the tables hold all.",
         basis(grid),
         count(every.into(), "frame", "frames"),
-        which
+        first_structure(grid)
     );
     with_caption(curves::draw(grid, &what), caption)
 }
@@ -89,7 +93,7 @@ fn draw_calls(grid: &Grid) -> Figure {
         only: Some(a_kind_each(grid)),
         series: &|r| counted(&r.draw_calls),
     };
-    chart(grid, what, "Draw calls of every frame", "Drawn is, on the first structure, the first of each kind of walk.")
+    chart(grid, what, "Draw calls of every frame", "the first of each kind of walk")
 }
 
 fn queries(grid: &Grid) -> Figure {
@@ -103,10 +107,5 @@ fn queries(grid: &Grid) -> Figure {
         only: Some(a_kind_each(grid)),
         series: &series,
     };
-    chart(
-        grid,
-        what,
-        "Occlusion queries of every frame",
-        "Drawn is, on the first structure, the first of each kind of walk.",
-    )
+    chart(grid, what, "Occlusion queries of every frame", "the first of each kind of walk")
 }
