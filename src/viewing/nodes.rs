@@ -14,7 +14,7 @@ pub const NOT_REACHED: u8 = 0;
 pub const DRAWN: u8 = 1;
 /// Its children were asked. Entries of its own, if it has any, are submitted.
 pub const WENT_ON: u8 = 2;
-/// The walk passed it by: no opening shows it, though no test is outside of it.
+/// The walk passed it by: no opening shows it, or occluders hide it, though no test is outside of it.
 pub const HIDDEN: u8 = 3;
 /// `CULLED + k`: test `k` was the first to be outside. The walk `flat` asks an inner
 /// node about entries of its own alone: then its children may be reached nonetheless.

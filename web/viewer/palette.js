@@ -23,7 +23,7 @@ export function decisionName(byte, tests) {
   if (byte === NOT_REACHED) return "Not reached";
   if (byte === DRAWN) return "Drawn";
   if (byte === WENT_ON) return "Went on to children";
-  if (byte === HIDDEN) return "Hidden: the walk saw no way there";
+  if (byte === HIDDEN) return "Hidden: the walk found nothing of it to see";
   return `Culled: ${tests[byte - FIRST_CULLED] ?? `test ${byte - FIRST_CULLED}`}`;
 }
 
