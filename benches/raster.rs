@@ -274,9 +274,9 @@ impl City {
         }
     }
 
-    /// Wall time of a frame on one and two threads, in turns.
+    /// Wall time of a frame on one and two threads, in turns, and CPU time of both together.
     fn threads(&self, wanted: &Wanted) {
-        println!("{:>6} {:>8} {:>10} {:>10} {:>7}", "frame", "kernel", "1, ms", "2, ms", "times");
+        println!("{:>6} {:>8} {:>8} {:>8} {:>7} {:>12}", "frame", "kernel", "1, ms", "2, ms", "times", "CPU of 2, ms");
         let pools = [1, 2].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("a pool"));
         for frame in 0..self.poses.len() {
             let view = self.view(frame);
@@ -284,16 +284,20 @@ impl City {
             for kernel in &wanted.kernels {
                 let mut buffer = DepthBuffer::with_kernel(SETTINGS, *kernel);
                 let mut times = [const { Vec::new() }; 2];
+                let mut cpu = [const { Vec::new() }; 2];
                 for _ in 0..3 * wanted.repeats {
-                    for (pool, times) in pools.iter().zip(&mut times) {
-                        let start = Instant::now();
+                    for ((pool, times), cpu) in pools.iter().zip(&mut times).zip(&mut cpu) {
+                        let (start, all) = (Instant::now(), clock_s(libc::CLOCK_PROCESS_CPUTIME_ID));
                         pool.install(|| self.draw(&mut buffer, &view, &objects));
                         times.push(start.elapsed().as_secs_f64() * 1e3);
+                        cpu.push((clock_s(libc::CLOCK_PROCESS_CPUTIME_ID) - all) * 1e3);
                     }
                 }
                 // Others use this machine, too: the quickest turns are those of two free cores.
-                let [one, two] = times.map(|t| t.into_iter().fold(f64::INFINITY, f64::min));
-                println!("{frame:>6} {:>8} {one:>10.2} {two:>10.2} {:>7.2}", format!("{kernel:?}"), one / two);
+                let least = |t: Vec<f64>| t.into_iter().fold(f64::INFINITY, f64::min);
+                let ([one, two], [_, both]) = (times.map(least), cpu.map(least));
+                let name = format!("{kernel:?}");
+                println!("{frame:>6} {name:>8} {one:>8.2} {two:>8.2} {:>7.2} {both:>12.2}", one / two);
             }
         }
     }
@@ -319,15 +323,16 @@ fn connected(scene: &Scene) -> Vec<u32> {
 
 /// Seconds of this thread's CPU time.
 fn cpu_s<R>(f: impl FnOnce() -> R) -> f64 {
-    let now = || {
-        let mut t = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-        // SAFETY: the clock exists and `t` is ours to write.
-        unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &mut t) };
-        t.tv_sec as f64 + t.tv_nsec as f64 * 1e-9
-    };
-    let start = now();
+    let start = clock_s(libc::CLOCK_THREAD_CPUTIME_ID);
     std::hint::black_box(f());
-    now() - start
+    clock_s(libc::CLOCK_THREAD_CPUTIME_ID) - start
+}
+
+fn clock_s(clock: libc::clockid_t) -> f64 {
+    let mut t = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: the clock exists and `t` is ours to write.
+    unsafe { libc::clock_gettime(clock, &mut t) };
+    t.tv_sec as f64 + t.tv_nsec as f64 * 1e-9
 }
 
 /// The same work for other programs, little-endian: u32 counts of vertices, triangles and
