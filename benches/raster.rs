@@ -234,7 +234,10 @@ impl City {
     }
 
     fn measure(&self, wanted: &Wanted) {
-        println!("{:>6} {:>8} {:>8} {:>22} {:>6}", "frame", "kernel", "ms", "objects culled", "false");
+        println!(
+            "{:>6} {:>8} {:>8} {:>8} {:>22} {:>6}",
+            "frame", "kernel", "one call", "by object", "objects culled", "false"
+        );
         for frame in 0..self.poses.len() {
             let view = self.view(frame);
             let objects = self.nearest_first(&view);
@@ -256,10 +259,21 @@ impl City {
                 let judged = Some((&places[..], &exact[..]));
                 export::mesh(folder, &format!("city_{frame}"), &screen, &vertices, &indices, judged);
             }
+            let sorted: Vec<u32> = objects
+                .iter()
+                .flat_map(|o| &self.order[self.starts[*o] as usize..self.starts[*o + 1] as usize])
+                .copied()
+                .collect();
+            let corners = |p: u32| self.scene.corners(sorted[p as usize]);
+            let whole = Occluders::new(sorted.len() as u32, self.scene.origin, corners, |_| Kind::OneSided, &[]);
             for kernel in &wanted.kernels {
                 let mut buffer = DepthBuffer::with_kernel(SETTINGS, *kernel);
-                let times: Vec<f64> =
-                    (0..wanted.repeats).map(|_| cpu_s(|| self.draw(&mut buffer, &view, &objects))).collect();
+                let turn = |_| {
+                    buffer.begin(&view, self.scene.origin);
+                    let once = cpu_s(|| buffer.draw(&whole, 0, whole.len() as u32));
+                    (once, cpu_s(|| self.draw(&mut buffer, &view, &objects)))
+                };
+                let (once, times): (Vec<f64>, Vec<f64>) = (0..wanted.repeats).map(turn).unzip();
                 let culled: Vec<bool> = places
                     .iter()
                     .map(|p| matches!(p, Place::Rect(r, nearness) if !buffer.shows_rect(*r, *nearness)))
@@ -268,32 +282,37 @@ impl City {
                 let wrong = culled.iter().zip(&exact).filter(|(a, b)| **a && !**b).count();
                 let all = exact.iter().filter(|e| **e).count();
                 let share = format!("{found} of {all}, {:.1} %", found as f64 / all as f64 * 100.0);
-                let ms = median(&times) * 1e3;
-                println!("{frame:>6} {:>8} {ms:>8.2} {share:>22} {wrong:>6}", format!("{kernel:?}"));
+                let (name, once, ms) = (format!("{kernel:?}"), median(&once) * 1e3, median(&times) * 1e3);
+                println!("{frame:>6} {name:>8} {once:>8.2} {ms:>9.2} {share:>22} {wrong:>6}");
             }
         }
     }
 
-    /// Wall time of a frame on one and two threads, in turns.
+    /// Wall time of a frame on one and two threads, in turns, and CPU time of both together.
     fn threads(&self, wanted: &Wanted) {
-        println!("{:>6} {:>8} {:>10} {:>10} {:>7}", "frame", "kernel", "1, ms", "2, ms", "times");
-        let pools = [1, 2].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("a pool"));
+        println!("{:>6} {:>8} {:>8} {:>8} {:>7} {:>12}", "frame", "kernel", "1, ms", "2, ms", "times", "CPU of 2, ms");
+        let pinned = |n| rayon::ThreadPoolBuilder::new().num_threads(n).start_handler(pin).build().expect("a pool");
+        let pools = [1, 2].map(pinned);
         for frame in 0..self.poses.len() {
             let view = self.view(frame);
             let objects = self.nearest_first(&view);
             for kernel in &wanted.kernels {
                 let mut buffer = DepthBuffer::with_kernel(SETTINGS, *kernel);
                 let mut times = [const { Vec::new() }; 2];
+                let mut cpu = [const { Vec::new() }; 2];
                 for _ in 0..3 * wanted.repeats {
-                    for (pool, times) in pools.iter().zip(&mut times) {
-                        let start = Instant::now();
+                    for ((pool, times), cpu) in pools.iter().zip(&mut times).zip(&mut cpu) {
+                        let (start, all) = (Instant::now(), clock_s(libc::CLOCK_PROCESS_CPUTIME_ID));
                         pool.install(|| self.draw(&mut buffer, &view, &objects));
                         times.push(start.elapsed().as_secs_f64() * 1e3);
+                        cpu.push((clock_s(libc::CLOCK_PROCESS_CPUTIME_ID) - all) * 1e3);
                     }
                 }
                 // Others use this machine, too: the quickest turns are those of two free cores.
-                let [one, two] = times.map(|t| t.into_iter().fold(f64::INFINITY, f64::min));
-                println!("{frame:>6} {:>8} {one:>10.2} {two:>10.2} {:>7.2}", format!("{kernel:?}"), one / two);
+                let least = |t: Vec<f64>| t.into_iter().fold(f64::INFINITY, f64::min);
+                let ([one, two], [_, both]) = (times.map(least), cpu.map(least));
+                let name = format!("{kernel:?}");
+                println!("{frame:>6} {name:>8} {one:>8.2} {two:>8.2} {:>7.2} {both:>12.2}", one / two);
             }
         }
     }
@@ -312,22 +331,33 @@ fn connected(scene: &Scene) -> Vec<u32> {
     for [a, b, c] in &scene.triangles {
         let tops = [*a, *b, *c].map(|v| top(&mut above, v));
         let first = tops[0].min(tops[1]).min(tops[2]);
-        tops.map(|t| above[t as usize] = first);
+        tops.iter().for_each(|t| above[*t as usize] = first);
     }
     scene.triangles.iter().map(|t| top(&mut above, t[0])).collect()
 }
 
+/// Keeps a thread on a core of its own.
+fn pin(thread: usize) {
+    // SAFETY: a set of cores is plain data, and ours.
+    unsafe {
+        let mut set: libc::cpu_set_t = std::mem::zeroed();
+        libc::CPU_SET(thread, &mut set);
+        libc::sched_setaffinity(0, size_of_val(&set), &set);
+    }
+}
+
 /// Seconds of this thread's CPU time.
 fn cpu_s<R>(f: impl FnOnce() -> R) -> f64 {
-    let now = || {
-        let mut t = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-        // SAFETY: the clock exists and `t` is ours to write.
-        unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &mut t) };
-        t.tv_sec as f64 + t.tv_nsec as f64 * 1e-9
-    };
-    let start = now();
+    let start = clock_s(libc::CLOCK_THREAD_CPUTIME_ID);
     std::hint::black_box(f());
-    now() - start
+    clock_s(libc::CLOCK_THREAD_CPUTIME_ID) - start
+}
+
+fn clock_s(clock: libc::clockid_t) -> f64 {
+    let mut t = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: the clock exists and `t` is ours to write.
+    unsafe { libc::clock_gettime(clock, &mut t) };
+    t.tv_sec as f64 + t.tv_nsec as f64 * 1e-9
 }
 
 /// The same work for other programs, little-endian: u32 counts of vertices, triangles and

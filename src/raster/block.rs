@@ -51,56 +51,6 @@ pub struct Block {
     pub y1: [i32; LANES],
 }
 
-/// Where a triangle that was set up is read from: a lane of a block, or alone.
-pub trait SetUp {
-    fn f(&self, column: usize) -> f32;
-    /// x0, x1, y0, y1.
-    fn rect(&self) -> [i32; 4];
-}
-
-pub struct Lane<'a>(pub &'a Block, pub usize);
-
-impl SetUp for Lane<'_> {
-    #[inline(always)]
-    fn f(&self, column: usize) -> f32 {
-        self.0.f[column][self.1 & (LANES - 1)]
-    }
-
-    #[inline(always)]
-    fn rect(&self) -> [i32; 4] {
-        let i = self.1 & (LANES - 1);
-        [self.0.x0[i], self.0.x1[i], self.0.y0[i], self.0.y1[i]]
-    }
-}
-
-/// A cache line.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-pub struct Alone {
-    f: [f32; COLUMNS],
-    rect: [u16; 4],
-}
-
-impl Alone {
-    #[inline(always)]
-    pub fn new(block: &Block, lane: usize) -> Alone {
-        let lane = Lane(block, lane);
-        Alone { f: std::array::from_fn(|c| lane.f(c)), rect: lane.rect().map(|v| v as u16) }
-    }
-}
-
-impl SetUp for Alone {
-    #[inline(always)]
-    fn f(&self, column: usize) -> f32 {
-        self.f[column]
-    }
-
-    #[inline(always)]
-    fn rect(&self) -> [i32; 4] {
-        self.rect.map(i32::from)
-    }
-}
-
 impl Block {
     pub const EMPTY: Block =
         Block { f: [[0.0; LANES]; COLUMNS], x0: [0; LANES], x1: [0; LANES], y0: [0; LANES], y1: [0; LANES] };

@@ -5,17 +5,17 @@ use super::lanes::Lanes;
 use super::large::Large;
 use super::tiles::TilesView;
 
-/// Draws the part of a small triangle that lies in the view's strips.
+/// Draws a small triangle.
 ///
 /// # Safety
-/// It was set up for this image; the kernel's features are there.
+/// The lane was set up for this image; the kernel's features are there.
 #[inline(always)]
-pub unsafe fn small<L: Lanes>(t: &TilesView, b: &impl SetUp) {
+pub unsafe fn small<L: Lanes>(t: &TilesView, b: &Block, lane: usize) {
     // SAFETY: as the caller promises.
     unsafe {
-        let [x0, x1, y0, y1] = b.rect();
-        let (first, last) = ((x0 >> 5).max(t.first), ((x1 - 1) >> 5).min(t.end - 1));
-        let of = |column: usize| L::f(b.f(column));
+        let (x0, x1, y0, y1) = (b.x0[lane], b.x1[lane], b.y0[lane], b.y1[lane]);
+        let (first, last) = (x0 >> 5, (x1 - 1) >> 5);
+        let of = |column: usize| L::f(b.f[column][lane]);
         let (left, left_step, left2, left2_step) = (of(LEFT), of(LEFT_STEP), of(LEFT2), of(LEFT2_STEP));
         let (right, right_step, right2, right2_step) = (of(RIGHT), of(RIGHT_STEP), of(RIGHT2), of(RIGHT2_STEP));
         let (across, zero) = (of(ACROSS), L::f(0.0));
@@ -42,7 +42,7 @@ pub unsafe fn small<L: Lanes>(t: &TilesView, b: &impl SetUp) {
     }
 }
 
-/// Draws the part of a large polygon that lies in the view's strips.
+/// Draws a large polygon.
 ///
 /// # Safety
 /// It was made for this image; the kernel's features are there.
@@ -67,8 +67,8 @@ pub unsafe fn large<L: Lanes>(t: &TilesView, g: &Large) {
             let inside = L::rows(g.y0 - y, g.y1 - y);
             let (from, to) = (L::pick_i(inside, from, L::i(g.x1)), L::pick_i(inside, to, L::i(-4096)));
             let nearness = L::add(near, L::mul(near_down, L::to_f(L::add_i(L::down(), L::i((y - top) >> 2)))));
-            let first = (L::least_i(from) >> 5).max(t.first);
-            let last = ((L::greatest_i(to) - 1) >> 5).min(t.end - 1);
+            let first = L::least_i(from) >> 5;
+            let last = (L::greatest_i(to) - 1) >> 5;
             let mut column = L::add(L::to_f(L::across()), L::f(((first - (g.x0 >> 5)) * 4) as f32));
             for strip in first..=last {
                 let z = L::max(L::add(nearness, L::mul(near_across, column)), least);

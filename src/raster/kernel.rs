@@ -1,10 +1,10 @@
 //! One rasteriser, three instruction sets: what is compiled for each, and the choice.
 
-use super::block::{Alone, Block, Corner, LANES, Lane, SetUp};
+use super::block::{Block, Corner, LANES};
 use super::fill;
 use super::lanes::Lanes;
 use super::lanes_scalar::Scalar;
-use super::large::{self, Large};
+use super::large;
 use super::occluders::Store;
 use super::project::Rect;
 use super::set_up::set_up;
@@ -40,50 +40,6 @@ impl Kernel {
     }
 }
 
-/// What is set up of some positions, to be drawn strip by strip.
-#[derive(Debug, Default)]
-pub struct Chunk {
-    pub smalls: Vec<Alone>,
-    pub larges: Vec<Large>,
-    /// Triangles in the order of positions, for each group of strips: `LARGE` marks large ones.
-    pub bins: Vec<Vec<u32>>,
-}
-
-const LARGE: u32 = 1 << 31;
-/// So many triangles before it is drawn, one's part of the buffer is fetched.
-const AHEAD: usize = 8;
-
-impl Chunk {
-    pub fn clear(&mut self, groups: usize) {
-        self.smalls.clear();
-        self.larges.clear();
-        self.bins.resize_with(groups, Vec::new);
-        self.bins.iter_mut().for_each(Vec::clear);
-    }
-
-    /// The small triangles of a block; returns the place of the first.
-    ///
-    /// # Safety
-    /// The kernel's features are there.
-    #[inline(always)]
-    unsafe fn add<L: Lanes>(&mut self, block: &Block, small: u32) -> u32 {
-        let first = self.smalls.len();
-        self.smalls.reserve(LANES);
-        // SAFETY: there is room for all lanes, and those that are kept were written.
-        unsafe {
-            L::records(block, small, self.smalls.as_mut_ptr().add(first));
-            self.smalls.set_len(first + small.count_ones() as usize);
-        }
-        first as u32
-    }
-
-    fn push(&mut self, item: u32, x0: i32, x1: i32, group_px: i32) {
-        for g in x0 / group_px..=(x1 - 1) / group_px {
-            self.bins[g as usize].push(item);
-        }
-    }
-}
-
 /// Room to set up in.
 #[derive(Debug)]
 pub struct Scratch {
@@ -97,16 +53,8 @@ impl Default for Scratch {
     }
 }
 
-/// Where triangles go that are set up.
-pub enum Sink<'a> {
-    /// To the buffer, at once.
-    Tiles(&'a TilesView),
-    /// To a chunk, for groups of strips of so many pixels.
-    Chunk(&'a mut Chunk, i32),
-}
-
 #[inline(always)]
-unsafe fn draw_in<L: Lanes>(lens: &Lens, store: &Store, first: u32, end: u32, scratch: &mut Scratch, sink: &mut Sink) {
+unsafe fn draw_in<L: Lanes>(lens: &Lens, store: &Store, first: u32, end: u32, scratch: &mut Scratch, t: &TilesView) {
     let Scratch { corners, blocks } = scratch;
     // A block is drawn when the next one is set up: until then the buffer's lines are on their way.
     let (mut current, mut waiting) = (0, 0);
@@ -135,25 +83,21 @@ unsafe fn draw_in<L: Lanes>(lens: &Lens, store: &Store, first: u32, end: u32, sc
                 }
                 other |= firsts;
                 if small | other != 0 {
-                    if let Sink::Tiles(t) = sink {
-                        prefetch::<L>(t, block, small);
-                        draw_block::<L>(t, &blocks[1 - current], waiting);
-                        (waiting, current) = (small, 1 - current);
-                    }
-                    if other != 0 || matches!(sink, Sink::Chunk(..)) {
-                        let block = if let Sink::Tiles(_) = sink { 1 - current } else { current };
-                        emit::<L>(lens, store, &view, b, p, &blocks[block], small, other, firsts, sink);
+                    prefetch::<L>(t, block, small);
+                    draw_block::<L>(t, &blocks[1 - current], waiting);
+                    waiting = small;
+                    if other != 0 {
+                        draw_mixed::<L>(lens, store, &view, b, p, &blocks[current], small, other, firsts, t);
                         waiting = 0;
                     }
+                    current = 1 - current;
                 }
                 p += LANES as u32;
             }
             p = stop;
             b += 1;
         }
-        if let Sink::Tiles(t) = sink {
-            draw_block::<L>(t, &blocks[1 - current], waiting);
-        }
+        draw_block::<L>(t, &blocks[1 - current], waiting);
     }
 }
 
@@ -173,13 +117,13 @@ unsafe fn draw_block<L: Lanes>(t: &TilesView, block: &Block, mut lanes: u32) {
         let lane = lanes.trailing_zeros() as usize;
         lanes &= lanes - 1;
         // SAFETY: the lane was set up; the caller has the features.
-        unsafe { fill::small::<L>(t, &Lane(block, lane)) };
+        unsafe { fill::small::<L>(t, block, lane & (LANES - 1)) };
     }
 }
 
 /// The triangles of a block in order, small ones and others; those of `pairs` with their partners.
 #[inline(always)]
-unsafe fn emit<L: Lanes>(
+unsafe fn draw_mixed<L: Lanes>(
     lens: &Lens,
     store: &Store,
     view: &BatchView,
@@ -189,23 +133,15 @@ unsafe fn emit<L: Lanes>(
     small: u32,
     other: u32,
     pairs: u32,
-    sink: &mut Sink,
+    t: &TilesView,
 ) {
-    // SAFETY: the caller has the features.
-    let first = if let Sink::Chunk(chunk, _) = sink { unsafe { chunk.add::<L>(block, small) } } else { 0 };
     let mut rest = small | other;
     while rest != 0 {
         let lane = rest.trailing_zeros() as usize & (LANES - 1);
         rest &= rest - 1;
         if small >> lane & 1 != 0 {
-            match sink {
-                // SAFETY: the lane was just set up.
-                Sink::Tiles(t) => unsafe { fill::small::<L>(t, &Lane(block, lane)) },
-                Sink::Chunk(chunk, group_px) => {
-                    let before = (small & between(0, lane as u32)).count_ones();
-                    chunk.push(first + before, block.x0[lane], block.x1[lane], *group_px);
-                }
-            }
+            // SAFETY: the lane was set up; the caller has the features.
+            unsafe { fill::small::<L>(t, block, lane) };
             continue;
         }
         let position = p + lane as u32;
@@ -215,35 +151,9 @@ unsafe fn emit<L: Lanes>(
             Some(quad) => large::make(lens, view, &quad, two_sided),
             None => large::make(lens, view, &store.fixed(batch, position), two_sided),
         };
-        let Some(large) = large else { continue };
-        match sink {
+        if let Some(large) = large {
             // SAFETY: it was just made.
-            Sink::Tiles(t) => unsafe { fill::large::<L>(t, &large) },
-            Sink::Chunk(chunk, group_px) => {
-                chunk.larges.push(large);
-                chunk.push(LARGE | (chunk.larges.len() as u32 - 1), large.x0, large.x1, *group_px);
-            }
-        }
-    }
-}
-
-#[inline(always)]
-unsafe fn replay_in<L: Lanes>(tiles: &TilesView, chunk: &Chunk, group: usize) {
-    let bin = &chunk.bins[group];
-    for (i, item) in bin.iter().enumerate() {
-        // SAFETY: as for `emit`.
-        unsafe {
-            if let Some(item) = bin.get(i + AHEAD)
-                && item & LARGE == 0
-            {
-                let [x0, _, y0, _] = chunk.smalls[*item as usize].rect();
-                tiles.prefetch::<L>(x0.max(tiles.first * 32), y0);
-            }
-            if item & LARGE != 0 {
-                fill::large::<L>(tiles, &chunk.larges[(item & !LARGE) as usize]);
-            } else {
-                fill::small::<L>(tiles, &chunk.smalls[*item as usize]);
-            }
+            unsafe { fill::large::<L>(t, &large) };
         }
     }
 }
@@ -254,7 +164,7 @@ macro_rules! kernels {
         $($(#[$doc])*
         ///
         /// # Safety
-        /// The view's strips are of this image and nobody else's; rectangles lie in it.
+        /// The buffer is of this image, and nobody else reads or writes what is drawn to; rectangles lie in it.
         pub unsafe fn $name(kernel: Kernel, $($arg: $type),*) -> $result {
             #[cfg(target_arch = "x86_64")]
             {
@@ -290,11 +200,17 @@ unsafe fn count_in<L: Lanes>(tiles: &TilesView, rect: Rect, nearness: f32, any: 
     unsafe { tiles.count::<L>(rect, nearness, any) }
 }
 
+#[inline(always)]
+unsafe fn join_in<L: Lanes>(tiles: &TilesView, other: &TilesView, strip: usize) {
+    // SAFETY: as the caller promises.
+    unsafe { tiles.join::<L>(other, strip) }
+}
+
 kernels! {
-    /// Sets up positions `first..end` of a store, in order, into the sink.
-    draw = draw_in(lens: &Lens, store: &Store, first: u32, end: u32, scratch: &mut Scratch, sink: &mut Sink) -> ();
-    /// Draws what a chunk holds for a group of strips.
-    replay = replay_in(tiles: &TilesView, chunk: &Chunk, group: usize) -> ();
+    /// Draws positions `first..end` of a store.
+    draw = draw_in(lens: &Lens, store: &Store, first: u32, end: u32, scratch: &mut Scratch, tiles: &TilesView) -> ();
+    /// See [`TilesView::join`].
+    join = join_in(tiles: &TilesView, other: &TilesView, strip: usize) -> ();
     /// See [`TilesView::count`].
     count = count_in(tiles: &TilesView, rect: Rect, nearness: f32, any: bool) -> u32;
 }

@@ -4,7 +4,7 @@
 //! arrays (the scalar twin), AVX2 or AVX-512 by explicit intrinsics. All of them round each
 //! operation once, in the same order, so their buffers are equal bit by bit.
 
-use super::block::{Alone, Block, Corner};
+use super::block::Corner;
 use super::code::Codes;
 use super::vertices::{Batch, BatchView};
 
@@ -73,6 +73,8 @@ pub trait Lanes: Copy {
     /// Raises the line at the pixels of `cover` to `code`; those outside of `known` were 0.
     /// Returns the least of the line if `cover` and `known` are all pixels.
     unsafe fn raise(line: *mut u16, known: u32, cover: u32, code: u16) -> u16;
+    /// Raises each pixel of a line to that of the other line; the least if all are known then.
+    unsafe fn join(line: *mut u16, known: u32, other: *const u16, other_known: u32) -> u16;
     /// Pixels of the line above `code`.
     unsafe fn above(line: *const u16, code: u16) -> u32;
 
@@ -80,21 +82,6 @@ pub trait Lanes: Copy {
     unsafe fn corners(at: *const Corner, words: *const u32) -> [Fetched<Self>; 3];
     /// Projects all vertices of a batch (see `vertices`).
     unsafe fn project(view: &BatchView, batch: &Batch<'_>, out: &mut [Corner]);
-    /// The lanes `live` of a block as records, in order.
-    ///
-    /// # Safety
-    /// There is room for sixteen.
-    #[inline(always)]
-    unsafe fn records(block: &Block, mut live: u32, mut to: *mut Alone) {
-        while live != 0 {
-            // SAFETY: as the caller promises.
-            unsafe {
-                to.write(Alone::new(block, live.trailing_zeros() as usize));
-                to = to.add(1);
-            }
-            live &= live - 1;
-        }
-    }
     /// Ends of runs for N rows of a half-plane's bound `at + step * row`, rows from `first`.
     unsafe fn bound(at: f64, step: f64, first: f64, limit: f64) -> Self::I;
 }

@@ -166,9 +166,24 @@ impl Lanes for Avx2 {
             if known | cover != !0 {
                 return 0;
             }
-            let m = _mm256_min_epu16(a, b);
-            let m = _mm_min_epu16(_mm256_castsi256_si128(m), _mm256_extracti128_si256::<1>(m));
-            _mm_extract_epi16::<0>(_mm_minpos_epu16(m)) as u16
+            least_pixel(a, b)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn join(line: *mut u16, known: u32, other: *const u16, other_known: u32) -> u16 {
+        // SAFETY: as above.
+        unsafe {
+            let half = |i: usize| {
+                let at = line.cast::<__m256i>().add(i);
+                let a = _mm256_and_si256(_mm256_load_si256(at), wide(known >> (16 * i)));
+                let b = _mm256_load_si256(other.cast::<__m256i>().add(i));
+                let new = _mm256_max_epu16(a, _mm256_and_si256(b, wide(other_known >> (16 * i))));
+                _mm256_store_si256(at, new);
+                new
+            };
+            let (a, b) = (half(0), half(1));
+            least_pixel(a, b)
         }
     }
 
@@ -217,6 +232,16 @@ impl Lanes for Avx2 {
             };
             _mm256_set_m128i(four(first + 4.0), four(first))
         }
+    }
+}
+
+#[inline(always)]
+unsafe fn least_pixel(a: __m256i, b: __m256i) -> u16 {
+    // SAFETY: callers have the features.
+    unsafe {
+        let m = _mm256_min_epu16(a, b);
+        let m = _mm_min_epu16(_mm256_castsi256_si128(m), _mm256_extracti128_si256::<1>(m));
+        _mm_extract_epi16::<0>(_mm_minpos_epu16(m)) as u16
     }
 }
 

@@ -1,6 +1,6 @@
 //! Sixteen lanes by AVX-512, explicit intrinsics only. A line of 32 pixels is one register.
 
-use super::block::{Alone, Block, Corner, OFF};
+use super::block::{Corner, OFF};
 use super::code::Codes;
 use super::lanes::{Fetched, Lanes};
 use super::vertices::{Batch, BatchView, FAR, SUBPIXELS};
@@ -140,9 +140,19 @@ impl Lanes for Avx512 {
             if known | cover != !0 {
                 return 0;
             }
-            let m = _mm256_min_epu16(_mm512_castsi512_si256(new), _mm512_extracti64x4_epi64::<1>(new));
-            let m = _mm_min_epu16(_mm256_castsi256_si128(m), _mm256_extracti128_si256::<1>(m));
-            _mm_extract_epi16::<0>(_mm_minpos_epu16(m)) as u16
+            least_pixel(new)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn join(line: *mut u16, known: u32, other: *const u16, other_known: u32) -> u16 {
+        // SAFETY: as above.
+        unsafe {
+            let a = _mm512_maskz_mov_epi16(known, _mm512_load_si512(line.cast()));
+            let b = _mm512_maskz_mov_epi16(other_known, _mm512_load_si512(other.cast()));
+            let new = _mm512_max_epu16(a, b);
+            _mm512_store_si512(line.cast(), new);
+            least_pixel(new)
         }
     }
 
@@ -202,40 +212,6 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn records(block: &Block, mut live: u32, mut to: *mut Alone) {
-        // SAFETY: callers have the features and room for sixteen records of 64 bytes.
-        unsafe {
-            let f = |c: usize| _mm512_castps_si512(_mm512_load_ps(block.f[c].as_ptr()));
-            let pair = |a: &[i32; 16], b: &[i32; 16]| {
-                let b = _mm512_slli_epi32::<16>(_mm512_load_si512(b.as_ptr().cast()));
-                _mm512_or_si512(_mm512_load_si512(a.as_ptr().cast()), b)
-            };
-            let rect = [pair(&block.x0, &block.x1), pair(&block.y0, &block.y1), _mm512_setzero_si512()];
-            let quarters = [
-                four_by_four(f(0), f(1), f(2), f(3)),
-                four_by_four(f(4), f(5), f(6), f(7)),
-                four_by_four(f(8), f(9), f(10), f(11)),
-                four_by_four(f(12), rect[0], rect[1], rect[2]),
-            ];
-            let mut records = [Block::EMPTY.x0; 16];
-            for j in 0..4 {
-                // Lane group g of q[k] holds columns 4 k .. 4 k + 4 of triangle 4 g + j.
-                let q = [quarters[0][j], quarters[1][j], quarters[2][j], quarters[3][j]];
-                let t = four_groups(q);
-                for (g, t) in t.into_iter().enumerate() {
-                    _mm512_storeu_si512(records[4 * g + j].as_mut_ptr().cast(), t);
-                }
-            }
-            while live != 0 {
-                let record = _mm512_loadu_si512(records[live.trailing_zeros() as usize & 15].as_ptr().cast());
-                _mm512_storeu_si512(to.cast(), record);
-                to = to.add(1);
-                live &= live - 1;
-            }
-        }
-    }
-
-    #[inline(always)]
     unsafe fn bound(at: f64, step: f64, first: f64, limit: f64) -> __m512i {
         // SAFETY: callers have the features.
         unsafe {
@@ -273,6 +249,16 @@ unsafe fn corner<const K: usize>(at: *const Corner, bytes: *const u8) -> Fetched
     }
 }
 
+#[inline(always)]
+unsafe fn least_pixel(line: __m512i) -> u16 {
+    // SAFETY: callers have the features.
+    unsafe {
+        let m = _mm256_min_epu16(_mm512_castsi512_si256(line), _mm512_extracti64x4_epi64::<1>(line));
+        let m = _mm_min_epu16(_mm256_castsi256_si128(m), _mm256_extracti128_si256::<1>(m));
+        _mm_extract_epi16::<0>(_mm_minpos_epu16(m)) as u16
+    }
+}
+
 /// In each group of four lanes the j-th of the result holds the j-th lanes of the four.
 #[inline(always)]
 unsafe fn four_by_four(r0: __m512i, r1: __m512i, r2: __m512i, r3: __m512i) -> [__m512i; 4] {
@@ -285,22 +271,6 @@ unsafe fn four_by_four(r0: __m512i, r1: __m512i, r2: __m512i, r3: __m512i) -> [_
             _mm512_unpackhi_epi64(a, c),
             _mm512_unpacklo_epi64(b, d),
             _mm512_unpackhi_epi64(b, d),
-        ]
-    }
-}
-
-/// The g-th of the result holds the g-th groups of four lanes of the four.
-#[inline(always)]
-unsafe fn four_groups(q: [__m512i; 4]) -> [__m512i; 4] {
-    // SAFETY: callers have the features.
-    unsafe {
-        let (a, b) = (_mm512_shuffle_i32x4::<0x44>(q[0], q[1]), _mm512_shuffle_i32x4::<0xee>(q[0], q[1]));
-        let (c, d) = (_mm512_shuffle_i32x4::<0x44>(q[2], q[3]), _mm512_shuffle_i32x4::<0xee>(q[2], q[3]));
-        [
-            _mm512_shuffle_i32x4::<0x88>(a, c),
-            _mm512_shuffle_i32x4::<0xdd>(a, c),
-            _mm512_shuffle_i32x4::<0x88>(b, d),
-            _mm512_shuffle_i32x4::<0xdd>(b, d),
         ]
     }
 }

@@ -166,6 +166,17 @@ impl Lanes for Scalar {
         }
         least
     }
+    unsafe fn join(line: *mut u16, known: u32, other: *const u16, other_known: u32) -> u16 {
+        let mut least = u16::MAX;
+        for i in 0..32 {
+            // SAFETY: lines have 32 pixels.
+            let (pixel, other) = unsafe { (&mut *line.add(i), *other.add(i)) };
+            let of = |known: u32, pixel: u16| if known >> i & 1 == 0 { 0 } else { pixel };
+            *pixel = of(known, *pixel).max(of(other_known, other));
+            least = least.min(*pixel);
+        }
+        least
+    }
     unsafe fn above(line: *const u16, code: u16) -> u32 {
         // SAFETY: a line has 32 pixels.
         (0..32).map(|i| u32::from(unsafe { *line.add(i) } > code) << i).sum()

@@ -22,7 +22,7 @@ pub enum Kind {
 }
 
 const MOST: usize = 128;
-const ENOUGH: usize = 48;
+const ENOUGH: usize = 16;
 const MOST_VERTICES: usize = 256;
 
 /// Occluders about a common origin. A clone shares them.

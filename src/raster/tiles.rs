@@ -54,8 +54,8 @@ impl Tiles {
         self.floors.fill(0.0);
         self.known.fill(0);
         // Pixels beyond the image count as covered, or the subtiles at its edges never were.
-        let edge_x = (self.width % 8 != 0).then_some(self.width / 8);
-        let edge_y = (self.height % 4 != 0).then_some(self.height / 4);
+        let edge_x = (!self.width.is_multiple_of(8)).then_some(self.width / 8);
+        let edge_y = (!self.height.is_multiple_of(4)).then_some(self.height / 4);
         let (across, down) = (self.width.div_ceil(8), self.height.div_ceil(4));
         if let Some(c) = edge_x {
             (0..down).for_each(|r| self.close(c, r));
@@ -83,8 +83,6 @@ impl Tiles {
             known: self.known.as_mut_ptr(),
             lines: self.lines.as_mut_ptr(),
             per_strip: self.per_strip,
-            first: 0,
-            end: self.strips as i32,
             codes,
         }
     }
@@ -104,20 +102,19 @@ impl Tiles {
     }
 }
 
-/// Strips `first..end` of a buffer, of which nobody else reads or writes.
+/// A buffer that threads may share strip by strip.
 #[derive(Debug, Clone, Copy)]
 pub struct TilesView {
     pub floors: *mut f32,
     pub known: *mut u32,
     pub lines: *mut Line,
     pub per_strip: usize,
-    pub first: i32,
-    pub end: i32,
     pub codes: Codes,
 }
 
-// SAFETY: whoever makes views sees to it that those of different threads have different strips.
+// SAFETY: whoever shares views sees to it that threads write to different strips.
 unsafe impl Send for TilesView {}
+// SAFETY: as above.
 unsafe impl Sync for TilesView {}
 
 impl TilesView {
@@ -179,11 +176,44 @@ impl TilesView {
                 let least = L::raise(line, *known, covers[i], codes[i] as u16);
                 *known |= covers[i];
                 if *known == !0 {
-                    let reached = self.codes.value(least);
-                    if reached > *floors.add(i) {
-                        *floors.add(i) = reached;
+                    self.settle::<L>(at + i, least);
+                }
+            }
+        }
+    }
+
+    /// All pixels of a subtile are known to be at `least` or above it.
+    #[inline(always)]
+    unsafe fn settle<L: Lanes>(&self, i: usize, least: u16) {
+        // SAFETY: as the caller promises.
+        unsafe {
+            let (floor, reached) = (self.floors.add(i), self.codes.value(least));
+            if reached > *floor {
+                *floor = reached;
+            }
+            *self.known.add(i) = L::above(self.lines.add(i).cast(), self.codes.of(*floor));
+        }
+    }
+
+    /// Raises a strip to what another buffer of the same image holds.
+    ///
+    /// # Safety
+    /// Nobody else uses this strip of either; the kernel's features are there.
+    #[inline(always)]
+    pub unsafe fn join<L: Lanes>(&self, other: &TilesView, strip: usize) {
+        for i in strip * self.per_strip..(strip + 1) * self.per_strip {
+            // SAFETY: as the caller promises.
+            unsafe {
+                if *other.floors.add(i) > *self.floors.add(i) {
+                    *self.floors.add(i) = *other.floors.add(i);
+                }
+                let (known, more) = (*self.known.add(i), *other.known.add(i));
+                if more != 0 {
+                    let least = L::join(self.lines.add(i).cast(), known, other.lines.add(i).cast(), more);
+                    *self.known.add(i) = known | more;
+                    if known | more == !0 {
+                        self.settle::<L>(i, least);
                     }
-                    *known = L::above(line, self.codes.of(*floors.add(i)));
                 }
             }
         }

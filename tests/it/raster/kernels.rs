@@ -16,7 +16,7 @@ fn never_nearer(image: &[f32], truth: &[f32], what: &str) -> (usize, usize) {
 }
 
 #[test]
-fn all_kernels_make_the_same_buffer_which_is_never_nearer_than_a_plain_one() {
+fn d5_1_all_kernels_make_the_same_buffer_which_is_never_nearer_than_a_plain_one() {
     let (mut ours, mut plains) = (0, 0);
     for seed in 0..60u64 {
         let (width, height) = SIZES[seed as usize % SIZES.len()];

@@ -74,7 +74,8 @@ fn queries_count_the_pixels_of_the_image() {
 
 #[test]
 fn answers_do_not_depend_on_kernel_threads_or_pieces() {
-    let t = triangles(7, 12_000);
+    // Enough to be shared.
+    let t = triangles(7, 40_000);
     let o = occluders(&t);
     let count = o.len() as u32;
     for (seed, coverage) in [(1, Coverage::Samples), (2, Coverage::Inner), (3, Coverage::Samples)] {
@@ -83,8 +84,8 @@ fn answers_do_not_depend_on_kernel_threads_or_pieces() {
         let boxes = boxes(seed, 300);
         let mut expected: Option<(Vec<u32>, Vec<u32>)> = None;
         for kernel in kernels() {
-            for threads in [1, 2, 3, 7] {
-                for piece in [count, 5000, 97] {
+            for threads in [1, 2, 5] {
+                for piece in [count, 997] {
                     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                     let found = pool.install(|| {
                         let mut buffer = DepthBuffer::with_kernel(s, kernel);
