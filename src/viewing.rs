@@ -159,10 +159,14 @@ impl RunView {
         if self.depth {
             self.go_to(n);
         }
-        let buffer = self.setup.walk.buffer().ok_or_else(|| {
-            Error::new("this walk draws no occluders, so there is no depth to show")
-                .key("ask")
-                .help("look at a run whose walk queries occlusion, such as `chc_pp`")
+        let (depth_at_all, none) = (self.depth, "this walk draws no occluders, so there is no depth to show");
+        let buffer = self.setup.walk.buffer().ok_or_else(|| match depth_at_all {
+            true => {
+                Error::new(format!("frame {n} was culled without queries, as they did not pay; no depth was drawn"))
+                    .key("frame")
+                    .help("look at another frame")
+            }
+            false => Error::new(none).key("ask").help("look at a run whose walk queries occlusion, such as `chc_pp`"),
         })?;
         let size = buffer.settings();
         encode_png(&depth(size.width_px, size.height_px, &buffer.image()))

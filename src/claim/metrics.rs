@@ -59,6 +59,12 @@ pub static METRICS: &[Metric] = &[
     metric("mean_queries", "queries", 0, "occlusion queries a frame"),
     metric("mean_stall_us", "µs", 2, "waiting for answers of queries, a frame, on the virtual clock"),
     metric("mean_triangles", "triangles", 0, "triangles submitted a frame"),
+    metric(
+        "missing_ppm",
+        "ppm",
+        0,
+        "of what a view cell's samples see, the share that its set lacks by their own estimate",
+    ),
     metric("over_submission", "", 0, "submitted over visible triangles, mean over judged frames"),
     metric("over_submission_hi", "", 0, "share of what was submitted that is not known to be visible"),
     metric("over_submission_lo", "", 0, "share of what was submitted that is proved invisible"),

@@ -21,7 +21,8 @@
 //! waiting for it. Multiqueries take nodes by their chance to stay hidden, the most certain
 //! first, and a query of a single node is not charged twice when it fails (else fresh
 //! nodes would all end in one hopeless query). Frames since a node's state changed count
-//! only as long as it is visited in each. Random numbers are a hash of seed, node and
+//! only as long as it is visited in each. The random first question comes 1 to
+//! `n_av` frames later, not 0. Random numbers are a hash of seed, node and
 //! frame. A node with entries of its own is asked about by its own box. Class and reason:
 //! see `queries/stage.rs`.
 
@@ -283,7 +284,7 @@ impl Order for ChcPlus {
             self.receive(stage);
         }
         self.history.begin(stage.hierarchy);
-        loop {
+        'frame: loop {
             while let Some(front) = self.pending.front() {
                 if stage.is_ready(front.ticket) {
                     self.receive(stage);
@@ -291,6 +292,9 @@ impl Order for ChcPlus {
                     self.ask_visible(stage, item);
                 } else if !stage.is_done() || !self.hidden.is_empty() {
                     break;
+                } else if self.pending.iter().all(|p| p.drawn) {
+                    // Answers about what is drawn anyway serve the next frame.
+                    break 'frame;
                 } else {
                     self.receive(stage);
                 }

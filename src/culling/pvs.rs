@@ -14,8 +14,8 @@
 //!
 //! Parallel rays have no eye point that a cell could hold; then the tests alone cull.
 //!
-//! A cell is sampled when the eye first comes to it, and kept: a trial's first pass, which
-//! is not timed, pays for that, as building does elsewhere.
+//! A cell is sampled when the eye first comes to it, and kept. A trial's first pass, which
+//! is not timed, does that; neither that time nor the sets' memory is in any figure.
 
 use super::descent::Descent;
 use super::pvs_cells::{Cell, CellNumber, Sampling, Set, Space, runs};

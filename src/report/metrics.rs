@@ -135,12 +135,22 @@ pub static METRICS: &[Metric] = &[
     metric("mean_nodes_visited", "nodes", Counted, "nodes judged a frame", |r| average(&r.nodes_visited)),
     metric("mean_queries", "queries", Counted, "occlusion queries a frame", |r| by_frame(r, "queries")),
     metric("mean_stall_us", "µs", Modelled, "waiting for answers of queries, a frame, on the virtual clock", |r| {
-        by_frame(r, "stall_ns").iter().map(|ns| ns / 1e3).collect()
+        // Who asks and never waits has no such counter.
+        let asks = !counter(r, "virtual_ns").is_empty();
+        let waited = counter(r, "stall_ns").first().copied().or(asks.then_some(0.0));
+        waited.iter().map(|ns| ns / frames(r) as f64 / 1e3).collect()
     }),
     metric("mean_triangles", "triangles", Counted, "triangles submitted a frame", |r| average(&r.triangles)),
     metric("median_frame_us", "µs", Measured, "culling time of the median frame", |r| {
         per_frame(r, stats::median, 1e3)
     }),
+    metric(
+        "missing_ppm",
+        "ppm",
+        Counted,
+        "of what a view cell's samples see, the share that its set lacks by their own estimate",
+        |r| by_frame(r, "pvs_missing_ppm"),
+    ),
     metric("nodes", "nodes", Counted, "nodes of the structure, root included", |r| counter(r, "nodes")).better(Neither),
     Metric {
         fold: |v| v.iter().copied().fold(f64::NAN, f64::max),

@@ -56,7 +56,7 @@ fn counted(values: &[f64]) -> Vec<Vec<f64>> {
 fn chart(grid: &Grid, what: Curves, about: &str, which: &str) -> Figure {
     let every = grid.results.consolidate_frames.max(1);
     let caption = format!(
-        "{about}; {}. Each point is the mean of {}. Identical in every repeat, so there is no band. Drawn is, on {}, {which}; the tables hold all.",
+        "{about}; {}. Each point is the mean of {}. Drawn is, on {}, {which}; the tables hold all.",
         basis(grid),
         count(every.into(), "frame", "frames"),
         first_structure(grid)

@@ -30,7 +30,10 @@ export class DepthPicture {
     this.frame = n;
     clearTimeout(this.timer);
     this.abort?.abort();
-    if (!this.on || n === undefined || n === this.loaded) return;
+    const shown = this.on && n !== undefined && n === this.loaded;
+    // A picture of another frame would mislead.
+    this.image.hidden = !shown;
+    if (!this.on || n === undefined || shown) return;
     this.timer = setTimeout(() => this.fetch(n), REST_MS);
   }
 
@@ -50,6 +53,7 @@ export class DepthPicture {
     } catch (error) {
       if (abort.signal.aborted) return;
       this.image.hidden = true;
+      this.loaded = null;
       this.note.textContent = `Frame ${n}: ${explain(error)}`;
     }
   }

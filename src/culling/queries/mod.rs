@@ -37,7 +37,8 @@ pub trait Backend: Send {
     fn prepare(&mut self, scene: &Scene, hierarchy: &Hierarchy) -> usize;
     /// Starts a frame: nothing is drawn, and queries of the frame before are answered.
     fn begin(&mut self, view: &View, hierarchy: &Hierarchy);
-    /// Draws the entries at positions `first..end`, in `calls` draw calls, none of them
+    /// Draws the entries at positions `first..end`, in `calls` draw calls (0: those of a
+    /// later one, the image has them at once), none of them
     /// nearer to the eye than `distance_m`; returns how many triangles hide things from
     /// now on.
     fn draw(&mut self, first: u32, end: u32, calls: u32, distance_m: f32) -> u32;

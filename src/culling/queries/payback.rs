@@ -1,8 +1,8 @@
 //! `auto`: queries that do not pay stop for a while.
 //!
 //! A frame's yield is what its queries spared (indices and draw calls of what they found
-//! hidden) over what they cost (queries, boxes, and occluders beside drawing them), all
-//! counted and priced as on the virtual clock. Below 1 the walk goes on as a plain
+//! hidden) over what they cost (queries, boxes, occluders beside drawing them, and waiting),
+//! all counted and priced as on the virtual clock. Below 1 the walk goes on as a plain
 //! `depth_first` for [`RETRY`] times the interval of re-tests. Then queries are tried
 //! until every visible leaf was asked about and the answer used, as the first frame knows
 //! nothing of the scene, and stay only if the last of these frames was worth [`ON`]: the

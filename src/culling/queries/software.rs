@@ -22,6 +22,8 @@ pub struct Software {
     latency_ns: Option<f64>,
     prices: Prices,
     clock: Clock,
+    /// Entries that a later call will draw.
+    unsubmitted: u64,
     /// Pixels, and when they are known; oldest first.
     answers: VecDeque<(u32, f64)>,
     /// Number of the oldest of them.
@@ -41,6 +43,7 @@ impl Software {
             latency_ns,
             prices,
             clock: Clock::default(),
+            unsubmitted: 0,
             answers: VecDeque::new(),
             oldest: 0,
         }
@@ -86,12 +89,15 @@ impl Backend for Software {
         let pixels = f64::from(width_px) * f64::from(height_px);
         self.px_per_m2 = pixels / (4.0 * view.half_width * view.half_height);
         self.perspective = view.is_perspective();
-        self.clock = Clock::default();
+        (self.clock, self.unsubmitted) = (Clock::default(), 0);
         self.answers.iter_mut().for_each(|a| a.1 = 0.0);
     }
 
     fn draw(&mut self, first: u32, end: u32, calls: u32, distance_m: f32) -> u32 {
-        self.clock.draw(&self.prices, u64::from(end - first), u64::from(calls));
+        self.unsubmitted += u64::from(end - first);
+        if calls > 0 {
+            self.clock.draw(&self.prices, std::mem::take(&mut self.unsubmitted), u64::from(calls));
+        }
         if !self.hides(first, end, distance_m) {
             return 0;
         }

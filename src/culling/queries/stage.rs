@@ -30,6 +30,8 @@ pub struct Occlusion<O> {
     backend: Box<dyn Backend>,
     front: Front,
     settings: Settings,
+    /// The depth buffer is of the last frame.
+    queried: bool,
     n_vp: u32,
     skipping: Skipping,
     payback: Option<Payback>,
@@ -47,6 +49,7 @@ impl<O: Order> Occlusion<O> {
             backend: backend(spec),
             front: Front::default(),
             settings: settings_of(spec),
+            queried: true,
             n_vp: spec.int("n_vp") as u32,
             skipping: Skipping::new(spec),
             payback: spec.bool("auto").then(|| Payback::new(n_av)),
@@ -81,7 +84,7 @@ impl<O: Order> Walk for Occlusion<O> {
     }
 
     fn buffer(&mut self) -> Option<&mut crate::raster::DepthBuffer> {
-        self.backend.buffer()
+        self.backend.buffer().filter(|_| self.queried)
     }
 
     fn samples(&self) -> Option<(u32, u32)> {
@@ -124,7 +127,8 @@ impl<O: Order> Walk for Occlusion<O> {
         out: &mut DrawList,
         tally: &mut Tally,
     ) {
-        if self.payback.as_mut().is_some_and(Payback::rests) {
+        self.queried = !self.payback.as_mut().is_some_and(Payback::rests);
+        if !self.queried {
             return self.rest(view, hierarchy, tests, out, tally);
         }
         self.backend.begin(view, hierarchy);
@@ -158,7 +162,8 @@ impl<O: Order> Walk for Occlusion<O> {
             let since = |of: fn(&Tally) -> u64| of(tally) - of(&before);
             payback.learn(
                 prices.draw_ns(since(|t| t.entries_occluded), hidden_calls),
-                prices.queries_ns(since(|t| t.queries), since(|t| t.boxes_queried), since(|t| t.occluders_drawn)),
+                prices.queries_ns(since(|t| t.queries), since(|t| t.boxes_queried), since(|t| t.occluders_drawn))
+                    + times.stall_ns as f64,
             );
         }
     }
