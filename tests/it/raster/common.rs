@@ -46,7 +46,7 @@ pub fn triangles(seed: u64, count: usize) -> Vec<Triangle> {
             0 => corners[2] = corners[0].lerp(corners[1], r.unit()) + r.vector() * 1e-6,
             1 => corners[2] = corners[1],
             // Coarsens its whole batch.
-            2 if seed % 5 == 0 => corners[r.below(3) as usize] *= 1e9,
+            2 if seed.is_multiple_of(5) => corners[r.below(3) as usize] *= 1e9,
             2 => corners[r.below(3) as usize] *= 100.0,
             3 => corners[r.below(3) as usize].y = [f64::NAN, f64::INFINITY, 1e300][r.below(3) as usize],
             4 => corners = corners.map(|c| (c * 4.0).round() * 0.25),
