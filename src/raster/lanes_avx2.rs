@@ -266,7 +266,7 @@ unsafe fn four(view: &BatchView, batch: &Batch<'_>, i: usize) -> [__m128i; 4] {
         let m = &view.to_camera;
         let (x, y) = (axis(&m[0], &q, view.offset[0]), axis(&m[1], &q, view.offset[1]));
         let z = axis(&m[2], &q, view.offset[2]);
-        let (half_x, half_y, near, zero) = (set(view.half[0]), set(view.half[1]), set(view.near), set(0.0));
+        let (half_x, half_y, near, zero) = (set(view.half[0]), set(view.half[1]), set(view.near_snap), set(0.0));
         let (scale, n, w, h) = if view.perspective {
             let scale = _mm256_div_pd(set(1.0), z);
             (scale, scale, _mm256_mul_pd(half_x, z), _mm256_mul_pd(half_y, z))

@@ -173,7 +173,7 @@ impl Lanes for Avx512 {
         // SAFETY: callers have the features; columns and `out` are padded to eight.
         unsafe {
             let set = |x: f64| _mm512_set1_pd(x);
-            let (half_x, half_y, near) = (set(view.half[0]), set(view.half[1]), set(view.near));
+            let (half_x, half_y, near) = (set(view.half[0]), set(view.half[1]), set(view.near_snap));
             let mut i = 0;
             while i < out.len() {
                 let load = |column: &[i32]| _mm512_cvtepi32_pd(_mm256_loadu_si256(column.as_ptr().add(i).cast()));

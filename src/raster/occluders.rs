@@ -62,8 +62,8 @@ struct Place {
 
 impl Occluders {
     /// Of `count` positions with world-space `corners` and `kind`. `starts` are positions,
-    /// ascending, at which ranges that are drawn usually begin (the leaves); it has no
-    /// influence on what is drawn.
+    /// ascending, at which ranges that are drawn usually begin (the leaves); triangles pair
+    /// between two of them only, so that a leaf drawn whole is drawn alike however calls are cut.
     pub fn new(
         count: u32,
         origin: DVec3,
@@ -73,9 +73,12 @@ impl Occluders {
     ) -> Occluders {
         let cuts = cut(count, starts);
         let corners = |p: u32| corners(p).map(|c| c - origin);
-        let made: Vec<Made> = cuts.par_windows(2).flat_map_iter(|w| Made::all(w[0], w[1], &corners, &kind)).collect();
+        let far_m = origin.abs().max_element();
+        let make = |w: &[u32]| Made::all(w[0], w[1], &corners, &kind, far_m);
+        let made: Vec<Made> = cuts.par_windows(2).flat_map_iter(make).collect();
         let mut s = Store { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY, hiding: vec![0], ..Default::default() };
-        for m in made {
+        for mut m in made {
+            m.part(starts);
             s.near_batch.resize((m.place.first as usize).div_ceil(64), s.batches.len().saturating_sub(1) as u32);
             let vertices = s.x.len() as u32;
             s.batches.push(Place { vertices, ..m.place });
@@ -229,18 +232,30 @@ struct Made {
 
 impl Made {
     /// Of a range, halved until a byte can name its vertices.
-    fn all(first: u32, end: u32, corners: &impl Fn(u32) -> [DVec3; 3], kind: &impl Fn(u32) -> Kind) -> Vec<Made> {
-        let made = Made::new(first, end, corners, kind);
+    fn all(
+        first: u32,
+        end: u32,
+        corners: &impl Fn(u32) -> [DVec3; 3],
+        kind: &impl Fn(u32) -> Kind,
+        far_m: f64,
+    ) -> Vec<Made> {
+        let made = Made::new(first, end, corners, kind, far_m);
         if made.vertices.len() <= MOST_VERTICES {
             return vec![made];
         }
         let middle = first + (end - first) / 2;
-        let mut halves = Made::all(first, middle, corners, kind);
-        halves.extend(Made::all(middle, end, corners, kind));
+        let mut halves = Made::all(first, middle, corners, kind, far_m);
+        halves.extend(Made::all(middle, end, corners, kind, far_m));
         halves
     }
 
-    fn new(first: u32, end: u32, corners: &impl Fn(u32) -> [DVec3; 3], kind: &impl Fn(u32) -> Kind) -> Made {
+    fn new(
+        first: u32,
+        end: u32,
+        corners: &impl Fn(u32) -> [DVec3; 3],
+        kind: &impl Fn(u32) -> Kind,
+        far_m: f64,
+    ) -> Made {
         let corners: Vec<[DVec3; 3]> = (first..end).map(corners).collect();
         // What is no place in space hides nothing.
         let sane = |c: &[DVec3; 3]| c.iter().all(|p| p.is_finite() && p.abs().max_element() < 1e15);
@@ -272,12 +287,23 @@ impl Made {
             }
             words[i] = word;
         }
-        // f64 itself rounds by this.
+        // f64 itself rounds by 1 of these; corners of split triangles are off their edges by 256.
         let size = if empty { 0.0 } else { lo.abs().max(hi.abs()).max_element() };
-        let off_m = off_m + size * f64::EPSILON;
+        let off_m = off_m + (size + far_m) * (512.0 * f64::EPSILON);
         let place = Place { first, vertices: 0, count: vertices.len() as u32, origin, step_m, off_m };
         let partners = if vertices.len() <= MOST_VERTICES { pairs::of(&words, &corners) } else { Vec::new() };
         Made { place, vertices, words, partners, lo, hi }
+    }
+
+    /// Parts what a start lies between.
+    fn part(&mut self, starts: &[u32]) {
+        let leaf = |i: usize| starts.partition_point(|s| *s <= self.place.first + i as u32);
+        for i in 0..self.partners.len() {
+            let on = self.partners[i];
+            if on > 0 && leaf(i) != leaf(i + on as usize) {
+                (self.partners[i], self.partners[i + on as usize]) = (0, 0);
+            }
+        }
     }
 }
 

@@ -3,7 +3,8 @@
 //! With inner coverage a pixel on the diagonal lies in neither half and would stay open;
 //! drawn by its outer sides the pair fills it. Only exactly coplanar triangles of
 //! one kind pair, so that one plane bounds the nearness of both. If rounding took a
-//! quadrilateral for convex that is not, its sides leave only part of it.
+//! quadrilateral for convex that is not, its sides leave only part of it. "Exactly" is of
+//! corners about the scene's origin: what one rounding of f64 joins counts as joined.
 
 use crate::math::{DVec3, exact};
 use std::cmp::Ordering;

@@ -92,8 +92,9 @@ impl Screen {
         let corners: [DVec3; 8] = std::array::from_fn(corner);
         let nearest = corners.iter().fold(f64::INFINITY, |m, c| m.min(c.z));
         let farthest = corners.iter().fold(f64::NEG_INFINITY, |m, c| m.max(c.z));
-        // Depth rounds by this at most; `nearest` becomes nearer by twice as much.
-        let span = (lo - self.eye).abs().max((hi - self.eye).abs());
+        // Coordinates round by this at most, the eye's own included; `nearest` becomes nearer by
+        // twice as much.
+        let span = (lo - self.eye).abs().max((hi - self.eye).abs()) + self.eye.abs();
         let hair = span.max_element() * 1e-14;
         if farthest < self.near_m - hair {
             return Place::Outside;
@@ -103,13 +104,18 @@ impl Screen {
         }
         let mut x = (f64::INFINITY, f64::NEG_INFINITY);
         let mut y = x;
+        let focal = self.rows[0].length().max(self.rows[1].length());
+        let reach = 0.5 * self.width_px.max(self.height_px);
+        let mut blur = HAIR_PX;
         for c in corners {
             let p = self.pixel(c);
             x = (x.0.min(p.x), x.1.max(p.x));
             y = (y.0.min(p.y), y.1.max(p.y));
+            // Where it is off the image it may be off by more.
+            blur = blur.max(HAIR_PX + hair * if self.perspective { (focal + reach) / c.z } else { focal });
         }
-        let first = |v: f64| (v - HAIR_PX).floor().max(0.0);
-        let end = |v: f64, size: f64| (v + HAIR_PX).ceil().min(size);
+        let first = |v: f64| (v - blur).floor().max(0.0);
+        let end = |v: f64, size: f64| (v + blur).ceil().min(size);
         let (x0, x1, y0, y1) = (first(x.0), end(x.1, self.width_px), first(y.0), end(y.1, self.height_px));
         if !(x0 < x1 && y0 < y1) {
             return Place::Outside;

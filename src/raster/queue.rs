@@ -114,9 +114,11 @@ fn pieces(waiting: &[(Arc<Store>, u32, u32)]) -> Vec<Piece<'_>> {
     for (store, first, end) in waiting {
         let mut p = *first;
         while p < *end {
-            let stop = end.min(&p.saturating_add(room)).to_owned();
+            // To the end of a batch: pairs lie in one.
+            let last = (*end).min(p.saturating_add(room)) - 1;
+            let stop = store.batch(store.batch_of(last)).1.end.min(*end);
             pieces.last_mut().expect("one at least").push((store, p, stop));
-            room -= stop - p;
+            room = room.saturating_sub(stop - p);
             p = stop;
             if room == 0 {
                 pieces.push(Vec::new());

@@ -10,7 +10,7 @@ use crate::math::DVec3;
 /// Corners snap to this part of a pixel.
 pub const SUBPIXELS: f64 = 65536.0;
 /// Corners farther than this from the image's origin are not snapped.
-const FAR_SUBPIXELS: f64 = (1 << 30) as f64;
+const FAR_SUBPIXELS: f64 = ((1 << 30) - 64) as f64;
 /// Triangles up to so many pixels across have differences that f32 holds exactly.
 pub const SMALL_PX: i32 = 252;
 
@@ -79,6 +79,8 @@ pub struct BatchView {
     pub to_camera: [[f64; 3]; 3],
     pub offset: [f64; 3],
     pub near: f64,
+    /// Corners beyond are beyond the near plane wherever they truly are.
+    pub near_snap: f64,
     pub ahead: f64,
     pub half: [f64; 2],
     /// By this a vertex may be off, in metres of camera space.
@@ -120,6 +122,7 @@ impl BatchView {
             to_camera: std::array::from_fn(|r| (s.rows[r] * batch.step_m).to_array()),
             offset: std::array::from_fn(|r| to_origin.dot(s.rows[r])),
             near: s.near_m.max(1e-30),
+            near_snap: s.near_m.max(1e-30) + 2.0 * off_m,
             ahead: lens.ahead,
             half: [s.width_px * 0.5, s.height_px * 0.5],
             off_m,
@@ -147,8 +150,8 @@ impl BatchView {
         let (w, h) = if self.perspective { (self.half[0] * z, self.half[1] * z) } else { (self.half[0], self.half[1]) };
         let px = (x * scale + self.half[0]) * SUBPIXELS;
         let py = (y * scale + self.half[1]) * SUBPIXELS;
-        let near = z < self.near;
-        let snapped = z >= self.near && px.abs() < FAR_SUBPIXELS && py.abs() < FAR_SUBPIXELS;
+        let near = z < self.near_snap;
+        let snapped = z >= self.near_snap && px.abs() < FAR_SUBPIXELS && py.abs() < FAR_SUBPIXELS;
         let snap = |v: f64| if snapped { v.round_ties_even() as i32 } else { OFF };
         let code = u32::from(near)
             | u32::from(x < -w) << 1

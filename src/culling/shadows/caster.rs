@@ -13,7 +13,7 @@ const LEAST_COSINE: f64 = 1e-6;
 /// An occluder that is steeper at some corner, or has an image with more acute angles
 /// (cosine between the normals of neighbouring edges), shares no edges: within rounding of
 /// one, the other need not be what hides.
-const SHARING_COSINE: f64 = 1e-3;
+const SHARING_COSINE: f64 = 2e-2;
 const ACUTE: f64 = -0.9998;
 /// Of the farthest corner: how far behind the plane things are certainly behind.
 const BEHIND: f64 = 1e-6;
@@ -43,7 +43,9 @@ impl Caster {
     pub fn new(image: &Image, polygons: &Polygons, polygon: &Polygon) -> Option<Caster> {
         let corners = polygons.corners(polygon);
         let fits = |wrong: f64| wrong * MARGIN <= image.guard;
-        let slack = polygon.slack_m / if image.perspective { image.near_m } else { 1.0 };
+        // At the near plane, where also what lies before or behind moves on the image.
+        let wide = 1.0 + image.half[0] + image.half[1];
+        let slack = polygon.slack_m * if image.perspective { wide / image.near_m } else { 1.0 };
         if slack > 0.5 * image.guard {
             return None;
         }

@@ -30,6 +30,8 @@ pub struct Face {
 
 /// Normals of one face differ by less (cosine): half a milliradian from the first.
 const ONE_PLANE: f64 = 1.0 - 1.25e-7;
+/// Vertices of one face are as near to the plane of its first triangle, in roundings of a coordinate.
+pub const FLAT: f64 = 8.0;
 /// Half-edges around a face: a limit to the work of one merge.
 const MOST_AROUND: usize = 256;
 const MOST_ROUNDS: usize = 16;
@@ -123,8 +125,15 @@ impl Mesh<'_> {
         }
         shared.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let normal = self.normals[face as usize];
+        let height = normal.dot(self.point(3 * face));
+        let flat =
+            |t: &u32| (3 * t..3 * t + 3).all(|h| (normal.dot(self.point(h)) - height).abs() <= FLAT * self.hair_m);
         let fits = |other: u32| {
             let more = &faces[other as usize].around;
+            // One plane for all of both, or what hides would not lie where it seems to.
+            if !faces[other as usize].triangles.iter().all(flat) {
+                return None;
+            }
             if self.normals[other as usize].dot(normal) < ONE_PLANE || around.len() + more.len() > MOST_AROUND {
                 return None;
             }
@@ -219,6 +228,9 @@ mod tests {
         }
         // A fold.
         points.iter_mut().filter(|p| p.x > 2.0).for_each(|p| p.z = 0.1 * (p.x - 2.0));
+        assert_eq!(faces(&points, &triangles, &[0; 32]).len(), 2);
+        // However slight: what lies in the crease is in plain sight.
+        points.iter_mut().filter(|p| p.x > 2.0).for_each(|p| p.z = 2e-4 * (p.x - 2.0));
         assert_eq!(faces(&points, &triangles, &[0; 32]).len(), 2);
     }
 }

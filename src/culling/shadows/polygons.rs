@@ -1,6 +1,6 @@
 //! The occluders of a scene: convex polygons of its triangles, prepared once.
 
-use super::merge::{Face, Mesh};
+use super::merge::{FLAT, Face, Mesh};
 use crate::hierarchy::NONE;
 use crate::math::DVec3;
 use crate::scene::Scene;
@@ -102,6 +102,8 @@ impl Polygons {
         if slack_m > 4.0 * rounding {
             return;
         }
+        // Out of the plane, too.
+        let slack_m = slack_m + if face.triangles.len() > 1 { 2.0 * FLAT * mesh.hair_m } else { 0.0 };
         let first = self.corners.len() as u32;
         let step = kept.len().div_ceil(MOST_CORNERS);
         let chosen: Vec<usize> = kept.iter().step_by(step).copied().collect();
