@@ -209,6 +209,7 @@ fn in_group(claim: &Claim, group: &Pairs, measured: Option<&Metric>, modelled: O
                 let verdict = decide(claim.relation, published, claim.tolerance, found);
                 // One trial says nothing of its own spread.
                 let lonely = matches!(metric.kind, Kind::Measured | Kind::Modelled)
+                    && !metric.is_virtual()
                     && pairs.iter().any(|(a, b)| a.len() < 2 || b.len() < 2);
                 if lonely {
                     note = "a single trial: no interval".into();

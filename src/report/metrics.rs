@@ -243,6 +243,11 @@ impl Metric {
         Some((value, low, high))
     }
 
+    /// On the virtual clock: modelled, but the same in every trial.
+    pub fn is_virtual(&self) -> bool {
+        matches!(self.name, "frame_ms_virtual" | "mean_stall_us")
+    }
+
     /// `total_cull_ms (ms)`.
     pub fn heading(&self) -> String {
         if self.unit.is_empty() { self.name.to_string() } else { format!("{} ({})", self.name, self.unit) }
