@@ -243,6 +243,6 @@ mod tests {
         assert_eq!(help("structur", None), "did you mean `structure`?");
         assert_eq!(help("octree", None), "write `cullmark parts structure octree`");
         assert_eq!(help("culling", Some("frustrum")), "did you mean `frustum`?");
-        assert!(help("walk", Some("xyz")).starts_with("known: depth_first"));
+        assert!(help("walk", Some("xyz")).starts_with("known: chc"));
     }
 }

@@ -9,8 +9,8 @@ use crate::hierarchy::{Hierarchy, LANES, NONE};
 /// Never asked about, nor anything below; what lies there shares the fate of the
 /// nearest node above that has one.
 pub const NOT_REACHED: u8 = 0;
-/// Submitted: a leaf that no test is outside of, or a node of which no test can say
-/// more, with all below it as one range.
+/// Submitted: a leaf that no test is outside of (by walks that judge triangles, a part of
+/// it), or a node of which no test can say more, with all below it as one range.
 pub const DRAWN: u8 = 1;
 /// Its children were asked. Entries of its own, if it has any, are submitted.
 pub const WENT_ON: u8 = 2;
@@ -115,6 +115,8 @@ impl Numbers {
                     0 if culled[node] != NOT_REACHED => culled[node],
                     0 => HIDDEN,
                     all if all == end - first => DRAWN,
+                    // A walk that judges triangles took some of the leaf.
+                    _ if links.child[lane] == NONE => DRAWN,
                     _ => {
                         pending.extend(Some(links.child[lane]).filter(|child| *child != NONE));
                         WENT_ON

@@ -97,6 +97,15 @@ fn walks() -> Vec<String> {
     WALKS.iter().map(small).collect()
 }
 
+/// Of a leaf such walks submit a part, and the mark says no more than that.
+fn judges_triangles(walk: &str) -> bool {
+    ["fast_v", "pvs"].contains(&walk)
+}
+
+fn within((first, end): (u32, u32), ranges: &[(u32, u32)]) -> bool {
+    ranges.iter().any(|(a, b)| *a <= first && end <= *b)
+}
+
 #[test]
 fn marks_of_nodes_make_up_what_the_walk_submitted_and_jumping_changes_nothing() {
     let spec = run_spec("list", "none", "flat", 5);
@@ -111,7 +120,11 @@ fn marks_of_nodes_make_up_what_the_walk_submitted_and_jumping_changes_nothing() 
         for (culling, walk) in sums().iter().flat_map(|c| walks().into_iter().map(move |w| (c, w))) {
             let walk = walk.as_str();
             let make = || make_walk(&Spec::parse(walk).unwrap()).unwrap().0;
-            if make().refuses(&h).is_some() {
+            // What hides takes its time, and asks tests no other way.
+            let hides = make().removes().occluded && walk != "portals";
+            if make().refuses(&h).is_some()
+                || hides && !["none", "frustum", "frustum+back_face"].contains(&culling.as_str())
+            {
                 continue;
             }
             for camera in [spec.camera, ortho] {
@@ -125,7 +138,12 @@ fn marks_of_nodes_make_up_what_the_walk_submitted_and_jumping_changes_nothing() 
                     let frame = view.frame(n, false).unwrap();
                     let read = Frame::read(&frame);
                     let want = walked(&View::new(&camera, pose), &h, &mut tests, own.as_mut());
-                    assert_eq!(marked(&h, &read.nodes), want, "{name} × {culling} × {walk}, frame {n}");
+                    let marked = marked(&h, &read.nodes);
+                    let what = format!("{name} × {culling} × {walk}, frame {n}");
+                    match judges_triangles(walk) {
+                        true => assert!(want.iter().all(|w| within(*w, &marked)), "{what}"),
+                        false => assert_eq!(marked, want, "{what}"),
+                    }
                     marks.extend(read.nodes);
                     frames.push(frame);
                 }
