@@ -2,7 +2,7 @@
 //!
 //! # Code map
 //! Two halves meet at plain types in [`record`]:
-//! - the **lab** (`math`, `scene`, `hierarchy`, `structure`, `culling`, `oracle`,
+//! - the **lab** (`math`, `scene`, `hierarchy`, `raster`, `structure`, `culling`, `oracle`,
 //!   `runner`, `advice`, `stats`, `viewing`) is synchronous: no tokio, no SQL, no HTTP, no clock
 //!   inside an algorithm;
 //! - the **service** (`manifest`, `matrix`, `store`, `worker`, `report`, `cli`)

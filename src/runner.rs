@@ -16,7 +16,7 @@ use crate::math::{Camera, Pose, View};
 use crate::record::{Counter, RunSpec, Sentinel, Series, TrialRecord};
 use crate::scene::{Scene, load, walkthrough};
 use crate::structure::{self, Structure};
-pub use judging::{judge, judge_setup, submitted};
+pub use judging::{by_own_samples, judge, judge_setup, submitted};
 use std::path::Path;
 use std::time::Instant;
 
@@ -253,9 +253,9 @@ fn record(
             counters.push(Counter { name: name.to_string(), unit: unit.to_string(), value });
         }
     }
-    for name in Tally::BY_FRAME {
-        let i = Tally::default().named().iter().position(|(n, _, _)| *n == name).expect("a counter has that name");
-        let further = column(name, Tally::default().named()[i].1, &|w| w.tally.named()[i].2);
+    let by_frame = |(_, (name, _, _)): &(usize, (&str, &str, u64))| Tally::BY_FRAME.contains(name);
+    for (i, (name, unit, _)) in Tally::default().named().into_iter().enumerate().filter(by_frame) {
+        let further = column(name, unit, &|w| w.tally.named()[i].2);
         series.extend(Some(further).filter(|s| s.values.iter().any(|v| *v != 0.0)));
     }
     let load = &setup.scene.report;

@@ -117,15 +117,8 @@ impl RunView {
         }
         self.go_to(n);
         let Setup { scene, hierarchy, views, removes, .. } = &self.setup;
-        let decisions = self.watch.read(|heard| match self.setup.walk.removes().occluded {
-            true => {
-                // In order of drawing, which need not be that of positions.
-                let mut submitted = heard.submitted.as_ref().unwrap_or(&self.list.ranges).clone();
-                submitted.sort_unstable();
-                self.numbers.decisions_by_list(hierarchy, &heard.answers, &submitted)
-            }
-            false => self.numbers.decisions(hierarchy, &heard.answers),
-        });
+        let hides = self.setup.walk.removes().occluded;
+        let decisions = self.watch.read(|heard| self.numbers.of_frame(hierarchy, heard, &self.list, hides));
         let sent = submitted(scene, hierarchy, &self.list);
         let mut states = vec![State::NOT_SUBMITTED; scene.len()];
         sent.triangles.iter().for_each(|t| states[t as usize] = State::UNSEEN);

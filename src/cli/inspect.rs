@@ -15,11 +15,11 @@ use crate::error::{Error, Result};
 use crate::manifest::axes;
 use crate::math::Arithmetic;
 use crate::oracle::image::Grid;
-use crate::oracle::{Effort, FrameTruth, losses, observed_class, verdict};
+use crate::oracle::{Effort, FrameTruth, judge_frame, losses, observed_class, verdict};
 use crate::preview::{self, write_png};
 use crate::record::Accuracy;
 use crate::registry::{Spec, parse_sum};
-use crate::runner::{Setup, submitted};
+use crate::runner::{Setup, by_own_samples, submitted};
 use crate::scene::{load, walkthrough};
 use crate::structure;
 use crate::viewing::watch::Watch;
@@ -101,7 +101,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     poses.truncate(args.frame as usize + 1);
     let (structure, _) = structure::make(&method.structure)?;
     let (tests, _) = culling::make_tests(&method.culling)?;
-    let (walk, _) = culling::make_walk(&method.walk)?;
+    let (mut walk, _) = culling::make_walk(&method.walk)?;
+    if args.depth.is_some() && walk.buffer().is_none() {
+        let e = Error::new(format!("asks for a depth buffer, but `{}` draws no occluders", method.walk));
+        let help = "leave it out, or choose a walk that queries occlusion, such as --walk chc_pp";
+        return Err(e.key("--depth").help(help).into());
+    }
     let mut setup = Setup::from_parts(scene, poses, &camera, structure.as_ref(), tests, walk)?;
 
     let watch = Watch::over(&mut setup.tests);
@@ -122,18 +127,27 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let sent = submitted(&setup.scene, &setup.hierarchy, &list);
     let mut losses = losses(&setup.scene, &view, &truth, &sent, setup.removes);
     losses.errors.submitted_entries = list.entry_count();
-    let wrong = verdict(setup.class, std::slice::from_ref(&losses.errors));
+    let wrong = match setup.promised_at(grid) {
+        None => verdict(setup.class, std::slice::from_ref(&losses.errors)),
+        Some(own) => {
+            let own = FrameTruth::of(&setup.scene, &view, args.frame, Grid::of(&own));
+            let errors = judge_frame(&setup.scene, &view, &own, &sent, setup.removes);
+            verdict(setup.class, &[errors]).map(|why| by_own_samples(&why, own.grid))
+        }
+    };
 
     if let Some(file) = &args.dump_submitted {
         let ids: Vec<u32> = sent.triangles.iter().map(|t| setup.scene.source_triangle_id[t as usize]).collect();
         write_ids(file, &ids)?;
     }
     if let Some(file) = &args.depth {
-        let walk = &method.walk;
         let buffer = setup.walk.buffer().ok_or_else(|| {
-            Error::new(format!("asks for a depth buffer, but `{walk}` draws no occluders"))
-                .key("--depth")
-                .help("leave it out, or choose a walk that queries occlusion, such as --walk chc_pp")
+            Error::new(format!(
+                "frame {} was culled without queries, as they did not pay; no depth was drawn",
+                args.frame
+            ))
+            .key("--depth")
+            .help("inspect another frame, or leave `auto` out")
         })?;
         let size = buffer.settings();
         write_png(file, &preview::depth(size.width_px, size.height_px, &buffer.image()))?;

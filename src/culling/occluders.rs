@@ -45,14 +45,7 @@ pub(super) fn class_of(coverage: Coverage) -> Class {
 }
 
 pub(super) fn occluders_of(scene: &Scene, hierarchy: &Hierarchy) -> Occluders {
-    let kind = |position: u32| {
-        let t = hierarchy.entries[position as usize] as usize;
-        match (scene.occluder[t], scene.two_sided[t]) {
-            (false, _) => Kind::Clear,
-            (true, false) => Kind::OneSided,
-            (true, true) => Kind::TwoSided,
-        }
-    };
+    let kind = |position: u32| Kind::of(scene, hierarchy.entries[position as usize]);
     let mut starts = Vec::new();
     for links in &hierarchy.links {
         let own = |l: &usize| links.live >> l & 1 == 1 && links.own_end[*l] > links.first[*l];

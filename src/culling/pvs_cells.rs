@@ -71,15 +71,10 @@ pub struct Space {
 
 impl Space {
     pub fn new(scene: &Scene, sampling: &Sampling) -> Space {
-        let kind = |t: usize| match (scene.occluder[t], scene.two_sided[t]) {
-            (false, _) => Kind::Clear,
-            (true, false) => Kind::OneSided,
-            (true, true) => Kind::TwoSided,
-        };
         let items = Items {
             positions: scene.positions.clone(),
             triangles: scene.triangles.clone(),
-            kinds: (0..scene.len()).map(kind).collect(),
+            kinds: (0..scene.len() as u32).map(|t| Kind::of(scene, t)).collect(),
         };
         let bounds = scene.bounds();
         let longest_m = if scene.is_empty() { 1.0 } else { bounds.size().max_element().max(1e-3) };

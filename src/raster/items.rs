@@ -209,15 +209,10 @@ mod tests {
     use crate::scene::{Scene, generate};
 
     fn items(scene: &Scene) -> Items {
-        let kind = |t: usize| match (scene.occluder[t], scene.two_sided[t]) {
-            (false, _) => Kind::Clear,
-            (true, false) => Kind::OneSided,
-            (true, true) => Kind::TwoSided,
-        };
         Items {
             positions: scene.positions.clone(),
             triangles: scene.triangles.clone(),
-            kinds: (0..scene.len()).map(kind).collect(),
+            kinds: (0..scene.len() as u32).map(|t| Kind::of(scene, t)).collect(),
         }
     }
 

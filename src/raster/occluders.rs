@@ -7,6 +7,7 @@
 use super::pairs;
 use super::vertices::Batch;
 use crate::math::DVec3;
+use crate::scene::Scene;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -19,6 +20,17 @@ pub enum Kind {
     /// Its front hides; seen from behind it is not drawn.
     OneSided,
     TwoSided,
+}
+
+impl Kind {
+    /// Of a triangle of a scene.
+    pub fn of(scene: &Scene, triangle: u32) -> Kind {
+        match (scene.occluder[triangle as usize], scene.two_sided[triangle as usize]) {
+            (false, _) => Kind::Clear,
+            (true, false) => Kind::OneSided,
+            (true, true) => Kind::TwoSided,
+        }
+    }
 }
 
 const MOST: usize = 128;

@@ -61,13 +61,16 @@ impl Setup {
             promised.extend(own.and_then(at));
         });
         let wrong = match own.and_then(|own| own.frames.first()) {
-            Some(first) => oracle::verdict(self.class, &promised).map(|why| {
-                format!("{why}, by the walk's own {} x {} samples", first.grid.columns(), first.grid.rows())
-            }),
+            Some(first) => oracle::verdict(self.class, &promised).map(|why| by_own_samples(&why, first.grid)),
             None => oracle::verdict(self.class, &frames),
         };
         Judgement { class: self.class, removes, wrong, frames, frames_hash: self.frames_hash(&work) }
     }
+}
+
+/// A verdict that came from truth at the samples of [`Setup::promised_at`].
+pub fn by_own_samples(why: &str, grid: Grid) -> String {
+    format!("{why}, by the walk's own {} x {} samples", grid.columns(), grid.rows())
 }
 
 /// Judges the answer of `spec` against the truth at sampled frames.

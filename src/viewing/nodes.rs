@@ -3,7 +3,8 @@
 //! Numbers follow the blocks of the hierarchy, in a block its live lanes. They say
 //! nothing of kinship; boxes and depths are for drawing.
 
-use super::watch::Answer;
+use super::watch::{Answer, Heard};
+use crate::culling::DrawList;
 use crate::hierarchy::{Hierarchy, LANES, NONE};
 
 /// Never asked about, nor anything below; what lies there shares the fate of the
@@ -47,6 +48,18 @@ impl Numbers {
 
     pub fn node(&self, block: u32, lane: usize) -> usize {
         self.first[block as usize] as usize + lane
+    }
+
+    /// What became of every node in a frame, from what was heard of it; `list` is what it
+    /// submitted in the end, and `hides` says that the walk leaves nodes out by itself.
+    pub fn of_frame(&self, hierarchy: &Hierarchy, heard: &Heard, list: &DrawList, hides: bool) -> Vec<u8> {
+        if !hides {
+            return self.decisions(hierarchy, &heard.answers);
+        }
+        // In order of drawing, which need not be that of positions.
+        let mut submitted = heard.submitted.as_ref().unwrap_or(&list.ranges).clone();
+        submitted.sort_unstable();
+        self.decisions_by_list(hierarchy, &heard.answers, &submitted)
     }
 
     /// What became of every node, from what the tests answered in one frame: a block

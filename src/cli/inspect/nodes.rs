@@ -22,15 +22,8 @@ impl Nodes {
     /// After a frame whose tests were watched.
     pub fn of(setup: &Setup, watch: &Watch, list: &DrawList) -> Nodes {
         let (numbers, hierarchy) = (Numbers::of(&setup.hierarchy), &setup.hierarchy);
-        let decisions = watch.read(|heard| match setup.walk.removes().occluded {
-            true => {
-                // In order of drawing, which need not be that of positions.
-                let mut submitted = heard.submitted.as_ref().unwrap_or(&list.ranges).clone();
-                submitted.sort_unstable();
-                numbers.decisions_by_list(hierarchy, &heard.answers, &submitted)
-            }
-            false => numbers.decisions(hierarchy, &heard.answers),
-        });
+        let hides = setup.walk.removes().occluded;
+        let decisions = watch.read(|heard| numbers.of_frame(hierarchy, heard, list, hides));
         let count = |is: &dyn Fn(u8) -> bool| decisions.iter().filter(|d| is(**d)).count() as u64;
         Nodes {
             drawn: count(&|d| d == DRAWN),

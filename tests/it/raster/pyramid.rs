@@ -34,6 +34,38 @@ fn d4_a_rectangle_that_a_pyramid_hides_is_hidden_at_each_of_its_pixels() {
     assert!(found > 300 && found * 2 > hidden, "{found} of {hidden}");
 }
 
+/// The same over cells of 8 x 4 pixels, as a buffer makes it, at sizes that no cell divides.
+#[test]
+fn d4_a_pyramid_over_cells_hides_no_pixel_that_is_open() {
+    let mut r = Random::new(44);
+    let mut found = 0;
+    for (width, height) in [(1, 1), (9, 5), (31, 7), (67, 41)] {
+        for near in [0.9, 0.99, 0.999] {
+            let image: Vec<f32> = (0..width * height).map(|_| if r.unit().abs() < near { 1.0 } else { 0.25 }).collect();
+            let at = |x: u32, y: u32| image[(y * width + x) as usize];
+            let within = |from: u32, step: u32, size: u32| from * step..size.min((from + 1) * step);
+            let farthest = |c: u32, r: u32| {
+                let pixels = within(r, 4, height).flat_map(|y| within(c, 8, width).map(move |x| (x, y)));
+                pixels.fold(f32::INFINITY, |m, (x, y)| m.min(at(x, y)))
+            };
+            let cells: Vec<f32> = (0..height.div_ceil(4))
+                .flat_map(|r| (0..width.div_ceil(8)).map(move |c| (c, r)))
+                .map(|(c, r)| farthest(c, r))
+                .collect();
+            let pyramid = Pyramid::over(&screen(width, height), [3, 2], &cells);
+            for _ in 0..2000 {
+                let (x0, y0) = (r.below(width.into()) as u32, r.below(height.into()) as u32);
+                let (x1, y1) = (width.min(x0 + 1 + r.below(40) as u32), height.min(y0 + 1 + r.below(30) as u32));
+                let shows = (y0..y1).any(|y| (x0..x1).any(|x| 0.5 >= at(x, y)));
+                let rect = Rect { x0, x1, y0, y1 };
+                assert!(!shows || pyramid.shows_rect(rect, 0.5), "{rect:?} of {width} x {height}");
+                found += u32::from(!pyramid.shows_rect(rect, 0.5));
+            }
+        }
+    }
+    assert!(found > 300, "{found}");
+}
+
 /// The trap of odd sizes: one open pixel in the last row or column, which a 2 x 2 reduction of
 /// an odd level drops.
 #[test]
